@@ -1,0 +1,1 @@
+"""Domains: worlds with objectives and a solver for the best policy under given weights."""

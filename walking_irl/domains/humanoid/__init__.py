@@ -1,0 +1,1 @@
+"""The walking humanoid: model, optimal gait, closed loop, expert."""

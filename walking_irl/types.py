@@ -1,0 +1,150 @@
+"""The contract between domains, algorithms and observers: plain immutable records.
+
+Larger feature expectations ``mu`` are better (costs enter with a minus sign) and the weights ``w``
+live on the simplex: ``w >= 0`` and ``sum(w) = 1``.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from walking_irl.polyhedron import WeightPolyhedron
+
+Array = NDArray[np.float64]
+
+
+class Objective(NamedTuple):
+    """One objective that a policy may be optimal for."""
+
+    name: str
+    unit: str
+    """Unit of the raw cost, before it is divided by ``scale``."""
+    scale: float
+    """Raw value that counts as one; weights live in the scaled space."""
+    meaning: str
+    """One sentence for a person."""
+    formula: str = ""
+
+
+def _no_policies() -> Array:
+    return np.empty((0, 0))
+
+
+@dataclass(frozen=True)
+class Response:
+    """Answer of a forward solver to a weight vector."""
+
+    policy: Any
+    """Opaque and picklable; only its domain looks inside."""
+    mu: Array
+    """Feature expectations, shape (K,)."""
+    sensitivity: Array | None = None
+    """d mu / d w, the Hessian of V(w) = max_pi w.mu(pi): shape (K, K), symmetric and positive
+    semi-definite; None where the domain has none, or where it cannot be trusted at this policy."""
+    evaluated: Array = field(default_factory=_no_policies)
+    """Feature expectations of every other policy evaluated on the way, shape (n, K): each is a
+    valid cut, free of charge."""
+    info: Mapping[str, Any] = field(default_factory=dict)
+    """Figures of the solver (iterations, seconds, ...)."""
+
+
+Forward = Callable[[Array], Response]
+
+
+@dataclass(frozen=True)
+class Expert:
+    """What a learner may know of an expert: never its weights.
+
+    Attributes:
+        mu: Feature expectations, shape (K,).
+        error: Confidence half-widths of ``mu``, shape (K,), zero where it is exact.
+        suboptimality: How much better than the expert a policy may be under its own weights, in
+            units of ``w.mu``; zero for an exactly optimal expert.
+        covariance: Covariance of the estimate ``mu``, shape (K, K), or None where it is exact.
+        n_samples: Independent trajectories behind ``mu``; 0 where it is exact.
+        demonstration: What was seen of the policy itself (for the humanoid a gait), or None.
+    """
+
+    mu: Array
+    error: Array
+    suboptimality: float = 0.0
+    covariance: Array | None = None
+    n_samples: int = 0
+    demonstration: Any = None
+
+
+class Status(enum.Enum):
+    """Why CPIRL yielded an iteration; every value but CUT and PROBE ends the run."""
+
+    CUT = "the policy cuts the polyhedron; continue"
+    PROBE = "an extreme weight of the tolerance set was tried, to tighten the intervals"
+    MATCHED = "the expert is optimal for these weights within the tolerance"
+    CONVERGED = "the estimate of the weights no longer moves"
+    GAP_CLOSED = "the best regret and its lower bound meet"
+    DOMINATED = "one policy is at least as good as the expert in every feature"
+    MIXTURE_DOMINATES = "a mixture of the policies found is at least as good in every feature"
+    EMPTY = "no weight satisfies every cut: the expert is not optimal, or its features are off"
+    STALLED = "the query repeats itself and the solver finds nothing better"
+    BUDGET = "the budget of forward solves is spent"
+
+
+class Rule(enum.Enum):
+    """How a query was chosen."""
+
+    CENTRE = "centre of the polyhedron"
+    NEWTON = "Newton step on the regret"
+    PROBE = "predicted extreme of the tolerance set"
+
+
+@dataclass(frozen=True)
+class Iteration:
+    """One forward solve of CPIRL and all that is known after it.
+
+    Attributes:
+        k: Index of the forward solve, from 0.
+        polyhedron: Localisation set in which ``w`` was chosen, before this iteration's cut.
+        w: Query, shape (K,).
+        rule: How the query was chosen.
+        response: The forward solver's answer.
+        regret: f(w) = max_i w.mu_i - w.mu_E over all policies evaluated so far.
+        best_regret: Smallest regret of any query so far.
+        certificate: t_k of the minimax program (theory: Theorem 6.2.3): some mixture of the
+            policies found loses at most t_k against the expert, whatever its weights.
+        intervals: Per-weight bounds after this iteration's cut, shape (K, 2).
+        estimate: Best estimate of the expert's weights after this iteration, shape (K,).
+        status: Why this iteration was yielded.
+    """
+
+    k: int
+    polyhedron: WeightPolyhedron
+    w: Array
+    rule: Rule
+    response: Response
+    regret: float
+    best_regret: float
+    certificate: float
+    intervals: Array
+    estimate: Array
+    status: Status
+
+
+class Domain(Protocol):
+    """A world with objectives, and a solver for the best policy under given weights."""
+
+    name: str
+    objectives: tuple[Objective, ...]
+
+    def forward(self, w: Array) -> Response:
+        """Solve "best policy for w"; deterministic; knows nothing of any expert."""
+        ...
+
+    def expert(self, w_E: Array, rng: np.random.Generator) -> Expert:
+        """Synthetic expert for hidden weights, solved at least as hard as any learner's query."""
+        ...
