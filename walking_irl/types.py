@@ -135,6 +135,27 @@ class Iteration:
     status: Status
 
 
+@dataclass(frozen=True)
+class Rollout:
+    """A recorded execution of a policy, sampled at every step of the simulation.
+
+    Attributes:
+        time: Times [s], shape (T,).
+        q: Joint positions [m, rad], shape (T, nv).
+        v: Joint velocities [m/s, rad/s], shape (T, nv).
+        a: Joint accelerations during the step that follows, shape (T, nv).
+        u: Joint torques during the step that follows [Nm], shape (T, nu).
+        sensors: Sensor readings at the start of the step, shape (T, ns).
+    """
+
+    time: Array
+    q: Array
+    v: Array
+    a: Array
+    u: Array
+    sensors: Array
+
+
 class Domain(Protocol):
     """A world with objectives, and a solver for the best policy under given weights."""
 
