@@ -23,6 +23,10 @@ class EmptyPolyhedronError(WalkingIRLError):
         self.radius = radius
 
 
+class FlatPolyhedronError(EmptyPolyhedronError):
+    """The weights left are too thin to have a centre: known to about 1e-6 in some direction."""
+
+
 class SolverError(WalkingIRLError):
     """A forward solver diverged or stalled from every start that it tried."""
 

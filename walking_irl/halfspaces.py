@@ -1,0 +1,196 @@
+"""Small dense geometry of bounded sets {z : A z <= b}: inscribed ball, log-barrier centre, vertices.
+
+Source: Boyd and Vandenberghe, *Convex Optimization*, sections 8.5 and 9.6. Everything that depends
+on size is done in the coordinates whitened by the barrier's Hessian, so that a set of width 1e-6 is
+treated as accurately as one of width 1.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+from scipy.optimize import linprog
+from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
+
+from walking_irl.errors import SolverError
+from walking_irl.types import Array
+
+FLAT_RADIUS = 1e-7
+"""Inscribed radius up to which a set counts as flat: the linear programs' own tolerance."""
+
+
+class Ball(NamedTuple):
+    """Largest inscribed ball; a negative radius says by how much the rows miss each other."""
+
+    z: Array
+    radius: float
+
+
+class BarrierCentre(NamedTuple):
+    """Analytic centre: argmin of -sum_i log(b_i - a_i.z); the Hessian there is ``R' R``."""
+
+    z: Array
+    R: Array
+    slack: Array
+
+
+def linear_program(c: Array, A: Array, b: Array) -> Array | None:
+    """Maximise c.x over A x <= b with free x.
+
+    Args:
+        c: Objective, shape (n,).
+        A: Rows, shape (m, n).
+        b: Right-hand sides, shape (m,).
+
+    Returns:
+        The maximiser, shape (n,), or None where no point satisfies the rows.
+
+    Raises:
+        SolverError: If the program is unbounded or the solver fails numerically.
+    """
+    result = None
+    for method in ("highs", "highs-ipm"):
+        result = linprog(-c, A_ub=A, b_ub=b, bounds=(None, None), method=method)
+        if result.status == 0:
+            return np.asarray(result.x, dtype=np.float64)
+        if result.status == 2:
+            return None
+    assert result is not None
+    raise SolverError(f"linear program with {len(b)} rows failed: {result.message}")
+
+
+def chebyshev_ball(A: Array, b: Array) -> Ball:
+    """Largest ball in {A z <= b}; the rows must have norm 1 and bound z.
+
+    The program is solved a second time around its first answer in units of the radius, because
+    the solver's feasibility tolerance of 1e-7 is absolute.
+
+    Args:
+        A: Unit rows, shape (m, n).
+        b: Right-hand sides, shape (m,).
+
+    Returns:
+        Centre, shape (n,), and radius. The centre need not be unique.
+    """
+    n = A.shape[1]
+    objective = np.r_[np.zeros(n), 1.0]
+    lifted = np.c_[A, np.ones(len(b))]
+    z, scale = np.zeros(n), 1.0
+    for _ in range(2):
+        y = linear_program(objective, lifted, (b - A @ z) / scale)
+        assert y is not None, "every point is feasible with a negative radius"
+        z = z + scale * y[:n]
+        radius = float(np.min(b - A @ z))
+        if abs(radius) > 1e-2:
+            break
+        scale = max(abs(radius), 1e-7)
+    return Ball(z, radius)
+
+
+def barrier_centre(A: Array, b: Array, z: Array, max_iter: int = 200) -> BarrierCentre:
+    """Analytic centre by feasible Newton steps from a strictly interior start.
+
+    Each step is a least-squares problem in the scaled rows A/s (their QR factors), whose condition
+    number is the square root of the Hessian's.
+
+    Args:
+        A: Rows, shape (m, n).
+        b: Right-hand sides, shape (m,).
+        z: Start with A z < b, shape (n,).
+        max_iter: Bound on Newton steps; about ten are needed.
+
+    Returns:
+        Centre, triangular root ``R`` of the Hessian, and slacks ``b - A z``, shape (m,).
+
+    Raises:
+        SolverError: If the start is not strictly inside, or Newton does not converge.
+    """
+    slack = b - A @ z
+    if slack.min() <= 0.0:
+        raise SolverError(f"start of the analytic centre misses a row by {-slack.min():.1e}")
+    for _ in range(max_iter):
+        Q, R = np.linalg.qr(A / slack[:, None])
+        gradient = Q.sum(axis=0)
+        decrement = float(gradient @ gradient)
+        step = -solve_triangular(R, gradient)
+        rate = (A @ step) / slack
+        z = z + _step_length(rate, decrement) * step
+        slack = b - A @ z
+        if decrement <= 1e-14:
+            return BarrierCentre(z, np.linalg.qr(A / slack[:, None])[1], slack)
+    if decrement <= 1e-6:  # rounding in the slacks of a very thin set: still well centred
+        return BarrierCentre(z, R, slack)
+    raise SolverError(f"analytic centre: Newton decrement {decrement:.1e} after {max_iter} steps")
+
+
+def _step_length(rate: Array, decrement: float) -> float:
+    """Backtracking on the barrier along a Newton step; ``rate`` is A dz / s, shape (m,)."""
+    if decrement < 0.05:  # region of quadratic convergence: the full step stays inside
+        return 1.0
+    fastest = float(rate.max())
+    t = min(1.0, 0.99 / fastest) if fastest > 0.0 else 1.0
+    while -np.log1p(-t * rate).sum() > -0.01 * t * decrement:
+        t *= 0.5
+    return t
+
+
+def whitened_rows(A: Array, centre: BarrierCentre, b: Array) -> Array:
+    """Rows of the same set in y = R (z - z_centre), with every right-hand side 1; shape (m, n)."""
+    slack = b - A @ centre.z
+    rows: Array = solve_triangular(centre.R, (A / slack[:, None]).T, trans="T").T
+    return rows
+
+
+def whitened_vertices(rows: Array) -> Array:
+    """Vertices of {y : rows y <= 1}, shape (n_vertices, n), without duplicates."""
+    if rows.shape[1] == 1:
+        return np.array([[1.0 / rows.min()], [1.0 / rows.max()]])
+    halfspaces = np.c_[rows, -np.ones(len(rows))]
+    origin = np.zeros(rows.shape[1])
+    try:
+        points = HalfspaceIntersection(halfspaces, origin).intersections
+    except QhullError:  # nearly parallel rows: let Qhull joggle its input
+        points = HalfspaceIntersection(halfspaces, origin, qhull_options="QJ").intersections
+    points = points[np.isfinite(points).all(axis=1)]
+    _, first = np.unique(np.round(points, 8), axis=0, return_index=True)
+    vertices: Array = points[np.sort(first)]
+    return vertices
+
+
+def whitened_facets(rows: Array) -> NDArray[np.intp]:
+    """Indices of the rows that no other rows imply in {y : rows y <= 1}.
+
+    By polarity they are the vertices of the convex hull of the rows themselves.
+    """
+    if rows.shape[1] == 1:
+        return np.unique([int(np.argmin(rows)), int(np.argmax(rows))])
+    try:
+        hull = ConvexHull(rows)
+    except QhullError:
+        hull = ConvexHull(rows, qhull_options="QJ")
+    return np.sort(hull.vertices).astype(np.intp)
+
+
+def distinct_rows(cuts: Array, is_lazy: NDArray[np.bool_]) -> tuple[Array, NDArray[np.bool_]]:
+    """Drop repeated unit cuts (within 1e-9), first ones kept; eager if any copy was."""
+    if len(cuts) < 2:
+        return cuts, is_lazy
+    _, first, group = np.unique(np.round(cuts, 9), axis=0, return_index=True, return_inverse=True)
+    group = group.reshape(-1)
+    lazy = np.ones(len(first), dtype=bool)
+    np.logical_and.at(lazy, group, is_lazy)
+    order = np.argsort(first)
+    return cuts[first[order]], lazy[order]
+
+
+def hull_volume(vertices: Array) -> float:
+    """Volume of the convex hull of points, shape (m, n), that span their space."""
+    if vertices.shape[1] == 1:
+        return float(np.ptp(vertices))
+    try:
+        return float(ConvexHull(vertices).volume)
+    except QhullError:
+        return float(ConvexHull(vertices, qhull_options="QJ").volume)

@@ -1,0 +1,320 @@
+"""The set of weights that still explain an expert: {w in simplex : w >= min_weight, D w <= 0}.
+
+Geometry lives in orthonormal coordinates z of the simplex's plane, w = 1/K + U z, in which
+distances, radii and Chebyshev centres mean the same for every objective (dropping one weight
+instead favours that weight).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+
+from walking_irl.errors import EmptyPolyhedronError, FlatPolyhedronError, InvalidInputError
+from walking_irl.halfspaces import (
+    FLAT_RADIUS,
+    Ball,
+    BarrierCentre,
+    barrier_centre,
+    chebyshev_ball,
+    distinct_rows,
+    hull_volume,
+    linear_program,
+    whitened_facets,
+    whitened_rows,
+    whitened_vertices,
+)
+from walking_irl.types import Array
+
+EXACT_OBJECTIVES = 7
+"""Largest number of objectives for which vertices and volumes are enumerated exactly."""
+
+
+@lru_cache(maxsize=64)
+def plane_basis(n_objectives: int) -> Array:
+    """Orthonormal basis U of {v : sum(v) = 0}, shape (K, K-1), so that w = 1/K + U z."""
+    K = n_objectives
+    Q, _ = np.linalg.qr(np.c_[np.ones(K), np.eye(K)[:, : K - 1]])
+    U: Array = np.ascontiguousarray(Q[:, 1:K])
+    U.setflags(write=False)
+    return U
+
+
+@dataclass(frozen=True, eq=False)
+class WeightPolyhedron:
+    """{w : w >= min_weight, sum(w) = 1, cuts w <= 0}; immutable, :meth:`cut` returns a new one.
+
+    Attributes:
+        n_objectives: K, at least 2.
+        min_weight: Lower bound of every weight.
+        cuts: Distinct cut normals, scaled to unit length within the plane, shape (m, K).
+        is_lazy: Which cuts an analytic centre may leave out while it satisfies them, shape (m,).
+        is_contradictory: Whether some cut excluded the whole simplex by itself.
+    """
+
+    n_objectives: int
+    min_weight: float
+    cuts: Array
+    is_lazy: NDArray[np.bool_]
+    is_contradictory: bool = False
+
+    @classmethod
+    def simplex(cls, n_objectives: int, min_weight: float = 0.0) -> WeightPolyhedron:
+        """All weights on the simplex with every weight at least ``min_weight``.
+
+        >>> WeightPolyhedron.simplex(3).contains(np.array([0.2, 0.3, 0.5]))
+        True
+
+        Raises:
+            InvalidInputError: If K < 2 or not 0 <= K min_weight < 1.
+        """
+        if n_objectives < 2:
+            raise InvalidInputError(f"need at least 2 objectives, got {n_objectives}")
+        if not 0.0 <= n_objectives * min_weight < 1.0:
+            raise InvalidInputError(
+                f"min_weight must lie in [0, 1/{n_objectives}), got {min_weight}"
+            )
+        return cls(n_objectives, min_weight, np.empty((0, n_objectives)), np.empty(0, dtype=bool))
+
+    def cut(self, d: Array) -> WeightPolyhedron:
+        """The part where d.w <= 0; ``d`` has shape (K,)."""
+        d = np.asarray(d, dtype=np.float64)
+        if d.shape != (self.n_objectives,):
+            raise InvalidInputError(
+                f"cut normal must have shape ({self.n_objectives},), got {d.shape}"
+            )
+        return self.cut_all(d[None])
+
+    def cut_all(self, D: Array, is_lazy: NDArray[np.bool_] | None = None) -> WeightPolyhedron:
+        """The part where every row of ``D`` satisfies d.w <= 0.
+
+        Rows are scaled to unit length within the plane; rows that hold on the whole simplex and
+        repetitions (within 1e-9) are dropped.
+
+        Args:
+            D: Cut normals, shape (m, K), in any units.
+            is_lazy: Rows that an analytic centre may ignore while it satisfies them, shape (m,).
+
+        Raises:
+            InvalidInputError: If ``D`` has another width or a value that is not finite.
+        """
+        K = self.n_objectives
+        D = np.asarray(D, dtype=np.float64)
+        if D.ndim != 2 or D.shape[1] != K:
+            raise InvalidInputError(f"cut normals must have shape (m, {K}), got {D.shape}")
+        if not np.isfinite(D).all():
+            raise InvalidInputError("cut normals must be finite")
+        lazy = np.zeros(len(D), dtype=bool) if is_lazy is None else np.asarray(is_lazy, dtype=bool)
+        norm = np.linalg.norm(D @ plane_basis(K), axis=1)
+        mean = D.mean(axis=1)
+        # The simplex lies within distance 1 of its middle: beyond that a row holds or fails on all.
+        matters = np.abs(mean) < norm
+        contradicts = bool(np.any(~matters & (mean > 0.0)))
+        cuts = np.r_[self.cuts, D[matters] / norm[matters, None]]
+        cuts, lazy = distinct_rows(cuts, np.r_[self.is_lazy, lazy[matters]])
+        return replace(
+            self,
+            cuts=cuts,
+            is_lazy=lazy,
+            is_contradictory=self.is_contradictory or contradicts,
+        )
+
+    @cached_property
+    def A(self) -> Array:
+        """Unit rows of A z <= b, shape (K + m, K - 1): the K bounds of the weights, then cuts."""
+        U = plane_basis(self.n_objectives)
+        return np.r_[-U / self._bound_norm, self.cuts @ U]
+
+    @cached_property
+    def b(self) -> Array:
+        """Right-hand sides of A z <= b, shape (K + m,)."""
+        K = self.n_objectives
+        bounds = np.full(K, (1.0 / K - self.min_weight) / self._bound_norm)
+        return np.r_[bounds, -self.cuts.mean(axis=1)]
+
+    @property
+    def _bound_norm(self) -> float:
+        return math.sqrt(1.0 - 1.0 / self.n_objectives)
+
+    def to_weights(self, z: Array) -> Array:
+        """Weights of plane coordinates, (..., K-1) -> (..., K)."""
+        w: Array = 1.0 / self.n_objectives + z @ plane_basis(self.n_objectives).T
+        return w
+
+    def to_plane(self, w: Array) -> Array:
+        """Plane coordinates of weights, (..., K) -> (..., K-1)."""
+        z: Array = w @ plane_basis(self.n_objectives)
+        return z
+
+    def contains(self, w: Array, tol: float = 1e-9) -> bool:
+        """Whether no row is missed by more than ``tol`` (a Euclidean distance)."""
+        w = np.asarray(w, dtype=np.float64)
+        if w.shape != (self.n_objectives,):
+            raise InvalidInputError(
+                f"weights must have shape ({self.n_objectives},), got {w.shape}"
+            )
+        if self.is_contradictory or abs(w.sum() - 1.0) > max(tol, 1e-9):
+            return False
+        return bool(np.all(self.A @ self.to_plane(w) <= self.b + tol))
+
+    @cached_property
+    def ball(self) -> Ball:
+        """Largest inscribed ball; radius < 0 where the set is empty (-inf for a contradiction)."""
+        if self.is_contradictory:
+            return Ball(np.zeros(self.n_objectives - 1), -math.inf)
+        return chebyshev_ball(self.A, self.b)
+
+    @property
+    def is_flat(self) -> bool:
+        """Whether the set is not empty but too thin to have a numerical interior."""
+        return -FLAT_RADIUS <= self.ball.radius <= FLAT_RADIUS
+
+    def chebyshev(self) -> Ball:
+        """Largest inscribed ball of a set with interior.
+
+        Raises:
+            EmptyPolyhedronError: If no weight satisfies every row.
+            FlatPolyhedronError: If the inscribed radius is at most 1e-7.
+        """
+        radius = self.ball.radius
+        if radius < -FLAT_RADIUS:
+            raise EmptyPolyhedronError(
+                f"no weight satisfies all {len(self.cuts)} cuts (they miss by {-radius:.1e})",
+                radius,
+            )
+        if radius <= FLAT_RADIUS:
+            raise FlatPolyhedronError(
+                f"the weights left by {len(self.cuts)} cuts are flat (radius {radius:.1e})", radius
+            )
+        return self.ball
+
+    @cached_property
+    def barrier(self) -> BarrierCentre:
+        """Analytic centre of the bounds, the cuts that are not lazy, and the lazy ones that matter.
+
+        A lazy row enters as soon as it cuts off the centre of those before it; many near-parallel
+        rows would otherwise push the centre away from them.
+
+        Raises:
+            EmptyPolyhedronError: If the set is empty or flat.
+        """
+        start = self.chebyshev().z
+        is_used = np.r_[np.ones(self.n_objectives, dtype=bool), ~self.is_lazy]
+        while True:
+            centre = barrier_centre(self.A[is_used], self.b[is_used], start)
+            slack = self.b - self.A @ centre.z
+            worst = int(np.argmin(slack))
+            if slack[worst] > 0.0:
+                return centre
+            if is_used[worst]:
+                raise FlatPolyhedronError(
+                    f"the analytic centre lies on a row (radius {self.ball.radius:.1e})",
+                    self.ball.radius,
+                )
+            is_used[worst] = True
+
+    @cached_property
+    def _whitened(self) -> Array:
+        return whitened_rows(self.A, self.barrier, self.b)
+
+    def _from_whitened(self, y: Array) -> Array:
+        """Weights of whitened coordinates, clipped onto the bounds against rounding."""
+        w = self.to_weights(self.barrier.z + solve_triangular(self.barrier.R, y.T).T)
+        w = np.maximum(w, self.min_weight)
+        normalised: Array = w / w.sum(axis=-1, keepdims=True)
+        return normalised
+
+    def vertices(self) -> Array:
+        """All vertices as weights, shape (n, K); exact enumeration for K <= 7.
+
+        Raises:
+            InvalidInputError: If K > 7.
+            EmptyPolyhedronError: If the set is empty or flat.
+        """
+        if self.n_objectives > EXACT_OBJECTIVES:
+            raise InvalidInputError(
+                f"vertices are enumerated up to {EXACT_OBJECTIVES} objectives, "
+                f"got {self.n_objectives}"
+            )
+        return self._from_whitened(whitened_vertices(self._whitened))
+
+    @property
+    def active_rows(self) -> NDArray[np.intp]:
+        """Indices into ``A`` of the rows that shape the set: no other rows imply them.
+
+        Raises:
+            EmptyPolyhedronError: If the set is empty or flat.
+        """
+        return whitened_facets(self._whitened)
+
+    def pruned(self) -> WeightPolyhedron:
+        """The same set without implied cuts (the bounds of the weights always stay).
+
+        The analytic centre depends on the rows, so pruning moves it; the set does not change.
+        """
+        K = self.n_objectives
+        active = self.active_rows
+        keep = active[active >= K] - K
+        return replace(self, cuts=self.cuts[keep], is_lazy=self.is_lazy[keep])
+
+    def volume(self) -> float:
+        """(K-1)-dimensional volume; exact for K <= 7, else scaled from the barrier's Hessian.
+
+        The estimate is exact on the simplex itself: vol(simplex) sqrt(det H_simplex / det H).
+        Flat and empty sets have volume 0.
+        """
+        if self.ball.radius <= FLAT_RADIUS:
+            return 0.0
+        n = self.n_objectives - 1
+        R = self.barrier.R
+        if self.n_objectives <= EXACT_OBJECTIVES:
+            return hull_volume(whitened_vertices(self._whitened)) / abs(
+                float(np.prod(R.diagonal()))
+            )
+        whole = WeightPolyhedron.simplex(self.n_objectives)
+        log_ratio = np.log(np.abs(whole.barrier.R.diagonal() / R.diagonal())).sum()
+        return math.sqrt(n + 1.0) / math.factorial(n) * math.exp(log_ratio)
+
+    def support(self, c: Array) -> tuple[float, Array]:
+        """Largest c.w over the set, and a weight vector that attains it.
+
+        Args:
+            c: Direction, shape (K,).
+
+        Raises:
+            EmptyPolyhedronError: If no weight satisfies every row.
+        """
+        w = self._support_point(np.asarray(c, dtype=np.float64))
+        return float(c @ w), w
+
+    def _support_point(self, c: Array) -> Array:
+        direction = c @ plane_basis(self.n_objectives)
+        if self.ball.radius > FLAT_RADIUS:
+            direction = solve_triangular(self.barrier.R, direction, trans="T")
+            norm = np.linalg.norm(direction)
+            direction = direction / norm if norm > 0.0 else direction
+            y = linear_program(direction, self._whitened, np.ones(len(self.b)))
+            assert y is not None, "the centre is feasible"
+            return self._from_whitened(y)
+        z = None
+        if self.ball.radius >= -FLAT_RADIUS:
+            z = linear_program(direction, self.A, self.b + FLAT_RADIUS)
+        if z is None:
+            raise EmptyPolyhedronError("no weight satisfies every cut", self.ball.radius)
+        w = np.maximum(self.to_weights(z), self.min_weight)
+        point: Array = w / w.sum()
+        return point
+
+    def intervals(self) -> Array:
+        """Smallest and largest value of each weight, shape (K, 2), from 2K linear programs.
+
+        Raises:
+            EmptyPolyhedronError: If no weight satisfies every row.
+        """
+        eye = np.eye(self.n_objectives)
+        return np.array([[-self.support(-e)[0], self.support(e)[0]] for e in eye])
