@@ -1,0 +1,144 @@
+"""The humanoid as a domain: six objectives, a solver, experts whose weights stay hidden."""
+
+from __future__ import annotations
+
+from concurrent.futures import Executor
+from dataclasses import dataclass
+
+import numpy as np
+
+from walking_irl.domains.humanoid.anatomy import Walker, load_walker
+from walking_irl.domains.humanoid.demonstrator import OptimalGait, best_gait
+from walking_irl.domains.humanoid.forward import Imitator, search
+from walking_irl.domains.humanoid.gait import Gait
+from walking_irl.domains.humanoid.objectives import OBJECTIVES
+from walking_irl.domains.humanoid.policy import tracking_policy
+from walking_irl.domains.humanoid.protocol import MANY, Measurement, Protocol, measure
+from walking_irl.domains.humanoid.rollout import averaged_gait
+from walking_irl.types import Array, Expert, Objective, Response, Rollout
+
+SUBOPTIMALITY = 1e-4
+"""How far from optimal an expert may be, relative to its costs: what contact jumps leave open."""
+
+
+@dataclass(frozen=True)
+class Demonstration:
+    """An expert and what stands behind it.
+
+    Attributes:
+        expert: All that a learner receives.
+        gait: The optimal gait itself; for scoring and pictures.
+        optimum: How it was found.
+        rollouts: What was recorded, or nothing where the gait itself is the demonstration.
+    """
+
+    expert: Expert
+    gait: Gait
+    optimum: OptimalGait
+    rollouts: tuple[Rollout, ...]
+
+
+class Remeasure:
+    """Measures a learner's gait the way the expert's was measured, under its own disturbances."""
+
+    def __init__(
+        self, planar: bool, protocol: Protocol, seed: int, executor: Executor | None
+    ) -> None:
+        n = max(protocol.rollouts, MANY if protocol.disturbance == "kicks" else 0)
+        self.planar, self.executor = planar, executor
+        self.protocol = Protocol(
+            n, protocol.noise, protocol.disturbance, protocol.cycles, protocol.skip
+        )
+        self.rng = np.random.default_rng([seed, 1])
+
+    def __call__(self, policy: Gait) -> tuple[Array, Array]:
+        """Mean feature expectations (6,) of a gait in closed loop, and their covariance (6, 6)."""
+        measured = measure(self.planar, policy, self.protocol, self.rng, self.executor)
+        return -measured.mean, measured.covariance
+
+
+class Humanoid:
+    """The walking humanoid (see :mod:`walking_irl.domains.humanoid`).
+
+    Args:
+        planar: Whether it walks in the sagittal plane only (14 instead of 25 joints).
+    """
+
+    objectives: tuple[Objective, ...] = OBJECTIVES
+
+    def __init__(self, planar: bool = False) -> None:
+        self.planar = planar
+        self.name = "humanoid-planar" if planar else "humanoid"
+
+    @property
+    def walker(self) -> Walker:
+        """The body."""
+        return load_walker(self.planar)
+
+    def forward(self, w: Array, executor: Executor | None = None) -> Response:
+        """Best gait for weights ``w``, shape (6,), from the shipped gaits."""
+        return search(self.planar, w, executor)
+
+    def expert(self, w_E: Array, rng: np.random.Generator) -> Expert:
+        """Expert for hidden weights, known by 20 closed-loop trajectories."""
+        return self.demonstrate(w_E, rng).expert
+
+    def demonstrate(
+        self,
+        w_E: Array,
+        rng: np.random.Generator,
+        protocol: Protocol | None = None,
+        executor: Executor | None = None,
+    ) -> Demonstration:
+        """Solve for the expert's gait and record it.
+
+        Args:
+            w_E: Hidden weights, shape (6,).
+            rng: Source of the search's hops and of the disturbances.
+            protocol: What is recorded.
+            executor: Runs independent solves and trajectories side by side.
+
+        Raises:
+            FallError: If the expert falls.
+        """
+        search_rng, walk_rng = rng.spawn(2)
+        optimum = best_gait(self.planar, w_E, search_rng, executor)
+        gait = Gait.from_vector(optimum.x, len(self.walker.joints))
+        protocol = protocol or Protocol()
+        if protocol.rollouts == 0:
+            expert = exact_expert(gait, optimum.folded)
+            return Demonstration(expert, gait, optimum, ())
+        measured = measure(self.planar, gait, protocol, walk_rng, executor)
+        policy = tracking_policy(self.walker, gait)
+        shown = averaged_gait(self.walker, measured.rollouts, policy, skip=protocol.skip)
+        return Demonstration(expert_from(measured, shown), gait, optimum, measured.rollouts)
+
+    def learner(self, expert: Expert, threads: int = 1) -> Imitator:
+        """The learner's forward solver: it starts from the demonstrated gait."""
+        return Imitator(expert.demonstration, self.planar, threads)
+
+    def remeasure(
+        self, protocol: Protocol, seed: int = 0, executor: Executor | None = None
+    ) -> Remeasure | None:
+        """Measures learners' gaits as the expert's was; None where the expert is exact."""
+        if protocol.rollouts == 0:
+            return None
+        return Remeasure(self.planar, protocol, seed, executor)
+
+
+def exact_expert(gait: Gait, folded: Array) -> Expert:
+    """Expert whose gait is known exactly on its knots."""
+    slack = SUBOPTIMALITY * float(np.mean(folded))
+    return Expert(-folded, np.zeros(len(folded)), slack, demonstration=gait)
+
+
+def expert_from(measured: Measurement, shown: Gait) -> Expert:
+    """Expert known by recorded walks: their mean with its error bars, and their mean gait."""
+    return Expert(
+        mu=-measured.mean,
+        error=measured.half_width,
+        suboptimality=SUBOPTIMALITY * float(np.mean(measured.mean)),
+        covariance=measured.covariance,
+        n_samples=len(measured.folded),
+        demonstration=shown,
+    )
