@@ -6,6 +6,7 @@ readings by ``sensor_mirror``. Numbers of the body live in ``models/humanoid.xml
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -73,6 +74,12 @@ class Walker:
     def torque_mirror(self) -> Array:
         """Swaps the sides of joint torques, shape (nu, nu)."""
         return self.mirror[self.n_root :, self.n_root :]
+
+    def model_at(self, timestep: float) -> mujoco.MjModel:
+        """Copy of the model for a simulation with this timestep [s]."""
+        model = copy.copy(self.model)
+        model.opt.timestep = timestep
+        return model
 
 
 @lru_cache
