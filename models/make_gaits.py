@@ -3,8 +3,8 @@
 A first guess is drawn from textbook joint angles (D. A. Winter, Biomechanics and Motor Control of
 Human Movement, 4th ed. 2009: key points of hip, knee and ankle at natural cadence), which neither
 stands on the ground nor obeys physics. A homotopy in the root penalty makes it walk, first under
-weights that keep it calm, then under the reference weights. Every gait then hops: it is shaken, solved
-again, and the cheapest gait is kept. Nothing but this file decides what is shipped.
+weights that keep it calm, then under the reference weights. Every gait then hops: it is shaken,
+solved again, and the cheapest gait is kept. Nothing but this file decides what is shipped.
 """
 
 from __future__ import annotations

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from walking_irl.polyhedron import WeightPolyhedron
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
 
 
 class Objective(NamedTuple):

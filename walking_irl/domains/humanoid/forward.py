@@ -50,7 +50,7 @@ def check_weights(w: Array) -> Array:
         raise InvalidInputError(f"expected {len(OBJECTIVES)} weights ({names}), got {w.size}")
     if not np.isfinite(w).all() or (w < 0).any() or w.sum() <= 0:
         raise InvalidInputError(f"weights must be finite, >= 0 and not all zero, got {w.tolist()}")
-    return w / w.sum()
+    return np.asarray(w / w.sum())
 
 
 def polish(planar: bool, w: Array, x: Array, stages: Sequence[Stage]) -> Solution:

@@ -79,9 +79,23 @@ def factors(ev: Evaluation, w: Array, penalty: float) -> Terms:
     n = len(ev.motion.q)
     pace = ev.motion.pace
     effort, work, smooth, stability, impact, time = np.sqrt(w / _SCALES * pace / n)
-    fixed = np.sqrt(np.array([SKID_WEIGHT, LEG_WEIGHT, LIMIT_WEIGHT, penalty]) / n)
-    gauge = np.sqrt([GAUGE_WEIGHT, GAUGE_WEIGHT, PERIOD_WEIGHT])
-    return Terms(effort, work, work, smooth, stability, impact, time * np.sqrt(n), *fixed, gauge)
+    skid, gap, limits, root = np.sqrt(
+        np.array([SKID_WEIGHT, LEG_WEIGHT, LIMIT_WEIGHT, penalty]) / n
+    )
+    return Terms(
+        effort=effort,
+        work=work,
+        work_end=work,
+        smooth=smooth,
+        stability=stability,
+        impact=impact,
+        time=time * np.sqrt(n),
+        skid=skid,
+        gap=gap,
+        limits=limits,
+        root=root,
+        gauge=np.sqrt([GAUGE_WEIGHT, GAUGE_WEIGHT, PERIOD_WEIGHT]),
+    )
 
 
 def weighted(ev: Evaluation, w: Array, penalty: float) -> Terms:
@@ -120,7 +134,7 @@ class Windows:
         for i, b in self.beyond:
             blocks[i, b] = self.mirror @ blocks[i, b]
             blocks[i, b, 0] += self.wrap[i, b] * dx[-2]
-        return blocks.reshape(n, 4 * nv)
+        return np.asarray(blocks.reshape(n, 4 * nv))
 
     def scatter(self, windows: Array) -> Array:
         """Transpose of :meth:`gather`: sum of windows (N, 4 nv) as (N nv + 2,)."""

@@ -19,7 +19,7 @@ from walking_irl.domains.humanoid.linearisation import (
     factors,
     weighted,
 )
-from walking_irl.types import Array
+from walking_irl.types import Array, Indices
 
 
 class Fold:
@@ -29,7 +29,7 @@ class Fold:
         order = [k for pair in zip(range(n), range(n - 1, -1, -1), strict=True) for k in pair][:n]
         place = np.empty(n, dtype=int)
         place[order] = np.arange(n)
-        self.permutation = (np.array(order)[:, None] * nv + np.arange(nv)).ravel()
+        self.permutation: Indices = (np.array(order)[:, None] * nv + np.arange(nv)).ravel()
         at = place[windows.knot]  # (N, 4)
         step, row, column = np.nonzero(at[:, :, None] >= at[:, None, :])
         self.blocks = (step, row, column)
@@ -51,12 +51,12 @@ class Fold:
 
 
 class NormalMatrix(NamedTuple):
-    """Half the Gauss-Newton Hessian of w.G: band, border (N nv, 2) in folded order, corner (2, 2)."""
+    """Half the Gauss-Newton Hessian of w.G in folded order: band, border (N nv, 2), corner."""
 
     band: Array
     border: Array
     corner: Array
-    permutation: Array
+    permutation: Indices
 
     def factor(self, damping: float, tether: Array | None = None) -> Factor:
         """Cholesky factor of the matrix plus ``damping`` and ``tether`` on its diagonal.
@@ -86,7 +86,7 @@ class Factor(NamedTuple):
     z: Array
     border: Array
     corner: Array
-    permutation: Array
+    permutation: Indices
 
     def solve(self, rhs: Array) -> Array:
         """Solution for a right-hand side in natural order, shape (N nv + 2,) or (N nv + 2, m)."""
@@ -124,8 +124,10 @@ def normal_matrix(lin: Linearisation, fold: Fold, w: Array, penalty: float) -> N
 
 
 def _weighted_rows(lin: Linearisation, w: Array, penalty: float) -> Array:
-    """Rows of all but the joint-wise terms and the impact; one row per torque carries the effort
-    and, by completing the square, both powers."""
+    """Rows of all but the joint-wise terms and the impact.
+
+    One row per torque carries the effort and, by completing the square, both powers.
+    """
     f = factors(lin.evaluation, w, penalty)
     root, tau, stability, skid, gap, align = lin.part
     rows = lin.rows.copy()

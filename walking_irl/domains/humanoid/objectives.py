@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from walking_irl.domains.humanoid.anatomy import Walker
-from walking_irl.types import Array, Objective, Rollout
+from walking_irl.types import Array, Indices, Objective, Rollout
 
 OBJECTIVES = (
     Objective(
@@ -98,16 +98,16 @@ class Motion(NamedTuple):
 
 
 class Layout(NamedTuple):
-    """Where the residuals find their quantities among joints and sensors (index arrays)."""
+    """Where the residuals find their quantities among joints and sensors; ``gap`` [m]."""
 
-    joints: Array
-    head: Array
-    momentum: Array
-    touch: Array
-    sole_x: Array
-    sole_z: Array
-    left_y: Array
-    right_y: Array
+    joints: Indices
+    head: Indices
+    momentum: Indices
+    touch: Indices
+    sole_x: Indices
+    sole_z: Indices
+    left_y: Indices
+    right_y: Indices
     gap: Array
 
 
@@ -157,8 +157,8 @@ def effort_slope(walker: Walker) -> tuple[Array, Array]:
 
 
 def root_power(p: Array) -> Array:
-    """Signed residual whose square is about \\|p\\| / (2 POWER_UNIT), smooth through zero."""
-    return np.sqrt(0.5 / POWER_UNIT) * p / (p * p + POWER_SMOOTHING**2) ** 0.25
+    """Signed residual whose square is about abs(p) / (2 POWER_UNIT), smooth through zero."""
+    return np.asarray(np.sqrt(0.5 / POWER_UNIT) * p / (p * p + POWER_SMOOTHING**2) ** 0.25)
 
 
 def residuals(walker: Walker, at: Layout, m: Motion) -> Residuals:
