@@ -1,4 +1,4 @@
-"""Small dense geometry of bounded sets {z : A z <= b}: inscribed ball, log-barrier centre, vertices.
+"""Small dense geometry of bounded sets {z : A z <= b}: ball, log-barrier centre, vertices.
 
 Source: Boyd and Vandenberghe, *Convex Optimization*, sections 8.5 and 9.6. Everything that depends
 on size is done in the coordinates whitened by the barrier's Hessian, so that a set of width 1e-6 is

@@ -128,14 +128,16 @@ class WeightPolyhedron:
     def A(self) -> Array:
         """Unit rows of A z <= b, shape (K + m, K - 1): the K bounds of the weights, then cuts."""
         U = plane_basis(self.n_objectives)
-        return np.r_[-U / self._bound_norm, self.cuts @ U]
+        rows: Array = np.r_[-U / self._bound_norm, self.cuts @ U]
+        return rows
 
     @cached_property
     def b(self) -> Array:
         """Right-hand sides of A z <= b, shape (K + m,)."""
         K = self.n_objectives
         bounds = np.full(K, (1.0 / K - self.min_weight) / self._bound_norm)
-        return np.r_[bounds, -self.cuts.mean(axis=1)]
+        bounds = np.r_[bounds, -self.cuts.mean(axis=1)]
+        return bounds
 
     @property
     def _bound_norm(self) -> float:
@@ -143,12 +145,13 @@ class WeightPolyhedron:
 
     def to_weights(self, z: Array) -> Array:
         """Weights of plane coordinates, (..., K-1) -> (..., K)."""
-        w: Array = 1.0 / self.n_objectives + z @ plane_basis(self.n_objectives).T
+        U = plane_basis(self.n_objectives)
+        w: Array = np.asarray(1.0 / self.n_objectives + z @ U.T)
         return w
 
     def to_plane(self, w: Array) -> Array:
         """Plane coordinates of weights, (..., K) -> (..., K-1)."""
-        z: Array = w @ plane_basis(self.n_objectives)
+        z: Array = np.asarray(w @ plane_basis(self.n_objectives))
         return z
 
     def contains(self, w: Array, tol: float = 1e-9) -> bool:
