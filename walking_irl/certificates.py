@@ -1,0 +1,189 @@
+"""What a run of CPIRL proves: bounds on losses and weights, each a theorem as a function.
+
+``D`` stacks the differences d_i = mu_i - mu_E of the policies found (or their robust versions),
+shape (n, K). The loss of policy i under weights w is L_i(w) = -d_i.w; under the expert's own
+weights it is what imitating with policy i costs.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import linprog
+
+from walking_irl.centres.centre import Centre
+from walking_irl.errors import InvalidInputError, SolverError
+from walking_irl.polyhedron import WeightPolyhedron, plane_basis
+from walking_irl.types import Array
+
+
+class Game(NamedTuple):
+    """Solution of the minimax program between the weights and a mixture of policies."""
+
+    value: float
+    """t_k: the mixture loses at most this much to the expert, whatever the expert's weights."""
+    mixture: Array
+    """Probabilities of the policies found, shape (n,)."""
+    w: Array
+    """Worst weights for the mixture, shape (K,): Kelley's query."""
+
+
+def game_lp(D: Array) -> Game:
+    """Minimax certificate t_k = max {t : w in simplex, -d_i.w >= t for all i} (Theorem 6.2.3).
+
+    By duality the mixture lambda (the multipliers) satisfies
+    0 <= w_E.(mu_E - mu_lambda) <= t_k, and min_i L_i(w_E) <= t_k. It never increases with more
+    policies. t_k > 0, = 0, < 0 if and only if the polyhedron of the rows has an interior, is flat,
+    or is empty (Gordan): t_k < 0 means that the mixture beats the expert in every feature.
+
+    >>> game = game_lp(np.array([[0.6, -0.4], [-0.4, 0.6]]))
+    >>> round(game.value, 9), game.mixture.round(9).tolist()
+    (-0.1, [0.5, 0.5])
+
+    Raises:
+        InvalidInputError: If ``D`` is not a finite matrix with at least one row.
+    """
+    D = _rows(D)
+    n, K = D.shape
+    scale = max(float(np.abs(D).max()), 1e-300)
+    result = linprog(
+        np.r_[np.zeros(K), -1.0],
+        A_ub=np.c_[D / scale, np.ones(n)],
+        b_ub=np.zeros(n),
+        A_eq=np.r_[np.ones(K), 0.0][None],
+        b_eq=[1.0],
+        bounds=[(0.0, None)] * K + [(None, None)],
+        method="highs",
+    )
+    if result.status != 0:
+        raise SolverError(f"minimax program of {n} policies failed: {result.message}")
+    mixture = np.maximum(-np.asarray(result.ineqlin.marginals), 0.0)
+    mixture = mixture / mixture.sum()
+    w = np.maximum(result.x[:K], 0.0)
+    # The mixture's own guarantee, exact whatever the solver's tolerance.
+    return Game(float(np.max(-(mixture @ D))), mixture, w / w.sum())
+
+
+def single_policy_bounds(P: WeightPolyhedron, D: Array) -> Array:
+    """U_i = max {L_i(w) : w in P} >= L_i(w_E) for each policy by itself, shape (n,)."""
+    return np.array([P.support(-d)[0] for d in _rows(D, P.n_objectives)])
+
+
+def radius(P: WeightPolyhedron, w: Array) -> float:
+    """Upper bound on max {||v - w||_2 : v in P} (exact for K <= 7 on sets with interior).
+
+    With it, L_i(w_E) <= radius(P, w_i) ||Pi d_i||_2 - f(w_i) (Theorem 6.2.2), Pi d = d - mean(d),
+    and ||w_E - w||_2 <= radius(P, w) (Theorem 6.2.7).
+    """
+    w = _weights(w, P.n_objectives)
+    if P.n_objectives <= 7 and not P.is_flat:
+        return float(np.linalg.norm(P.vertices() - w, axis=1).max())
+    lo, hi = P.intervals().T
+    return float(np.linalg.norm(np.maximum(np.abs(hi - w), np.abs(lo - w))))
+
+
+def radius_bound(P: WeightPolyhedron, w: Array, d: Array, regret: float) -> float:
+    """Theorem 6.2.2: L(w_E) <= radius(P, w) ||Pi d||_2 - f(w) for the policy found at ``w``."""
+    d = _rows(np.atleast_2d(d), P.n_objectives)[0]
+    return radius(P, w) * float(np.linalg.norm(d - d.mean())) - regret
+
+
+def loss_bound(w_E: Array, w: Array, d: Array, regret: float) -> float:
+    """Lemma 6.2.1: the loss of the policy found at ``w`` is bounded by the weights' distance.
+
+    f(w) + L(w_E) = (w_E - w).(mu_E - mu), both terms are >= 0, hence
+    L(w_E) <= min(||w_E - w||_2 ||Pi d||_2, ||w_E - w||_1 span(d)/2) - f(w).
+    """
+    w_E, w = _weights(w_E), _weights(w)
+    step = w_E - w
+    euclidean = np.linalg.norm(step) * np.linalg.norm(d - d.mean())
+    return float(min(euclidean, 0.5 * np.abs(step).sum() * np.ptp(d)) - regret)
+
+
+def ellipsoid_bounds(centre: Centre, d: Array) -> tuple[float, float]:
+    """Closed-form bracket of U = max {-d.w : w in P} from a centre's ellipsoids (Theorem 6.2.4).
+
+    -d.c + inner ||q||_S <= U <= -d.c + outer ||q||_S with q = -U'd and S the centre's shape.
+    """
+    d = _rows(np.atleast_2d(d), len(centre.w))[0]
+    q = plane_basis(len(centre.w)).T @ d
+    length = math.sqrt(max(float(q @ centre.shape @ q), 0.0))
+    middle = -float(d @ centre.w)
+    return middle + centre.inner * length, middle + centre.outer * length
+
+
+def ellipsoid_intervals(centre: Centre) -> Array:
+    """Per-weight intervals from the outer ellipsoid, shape (K, 2): they contain P's (6.2.7)."""
+    U = plane_basis(len(centre.w))
+    half = centre.outer * np.sqrt(np.einsum("ij,jk,ik->i", U, centre.shape, U))
+    return np.c_[centre.w - half, centre.w + half]
+
+
+def diameter_bounds(centre: Centre) -> tuple[float, float]:
+    """2 inner lambda <= diam(P) <= 2 outer lambda, lambda the longest semi-axis (6.2.8)."""
+    longest = math.sqrt(float(np.linalg.eigvalsh(centre.shape)[-1]))
+    return 2.0 * centre.inner * longest, 2.0 * centre.outer * longest
+
+
+def volume_bound(D: Array, volume_ratio: float) -> float:
+    """Theorem A1: t_k <= B a/(1 - a), a = (vol P_k / vol simplex)^(1/(K-1)), B = max d_ij^+.
+
+    Args:
+        D: All cuts of P_k, shape (n, K).
+        volume_ratio: vol P_k / vol simplex, in [0, 1).
+    """
+    D = _rows(D)
+    if not 0.0 <= volume_ratio < 1.0:
+        raise InvalidInputError(f"volume_ratio must lie in [0, 1), got {volume_ratio}")
+    alpha = volume_ratio ** (1.0 / (D.shape[1] - 1))
+    return max(float(D.max()), 0.0) * alpha / (1.0 - alpha)
+
+
+GRAVITY_RATE = -math.log(1.0 - 1.0 / math.e)
+"""Volume lost per cut through the centre of gravity, in nats (Gruenbaum)."""
+ELLIPSOID_RATE = -math.log(0.843)
+"""The same for the largest inscribed *ellipsoid* (not the polyhedron) and its centre."""
+
+
+def iteration_bound(n_objectives: int, accuracy: float, centre: str = "cg") -> float:
+    """Forward solves after which t_k <= accuracy B, from Theorem A1 (6.2.5, 6.2.6).
+
+    n ln(1 + 1/accuracy) / rate with n = K - 1 and the rate 0.459 per cut for the centre of
+    gravity; 0.171 for the inscribed ellipsoid, whose often quoted factor 1 - 1/n is false. The
+    analytic centre has only a polynomial bound, far too large to be of use.
+
+    Raises:
+        InvalidInputError: If the centre has no such bound, or the accuracy is not in (0, 1).
+    """
+    rates = {"cg": GRAVITY_RATE, "mvie": ELLIPSOID_RATE}
+    if centre not in rates:
+        raise InvalidInputError(f"no iteration bound for centre {centre!r}; choose from cg, mvie")
+    if not 0.0 < accuracy < 1.0:
+        raise InvalidInputError(f"accuracy must lie in (0, 1), got {accuracy}")
+    return (n_objectives - 1) * math.log1p(1.0 / accuracy) / rates[centre]
+
+
+def level_bound(n_objectives: int, accuracy: float) -> float:
+    """Theorem A3: cuts through centres of gravity until f(w_k) <= accuracy max_j f(e_j)."""
+    if not 0.0 < accuracy < 1.0:
+        raise InvalidInputError(f"accuracy must lie in (0, 1), got {accuracy}")
+    return (n_objectives - 1) * math.log(1.0 / accuracy) / GRAVITY_RATE
+
+
+def _rows(D: Array, width: int | None = None) -> Array:
+    D = np.asarray(D, dtype=np.float64)
+    if D.ndim != 2 or len(D) == 0 or width not in (None, D.shape[1]):
+        expected = "K" if width is None else width
+        raise InvalidInputError(f"differences must have shape (n >= 1, {expected}), got {D.shape}")
+    if not np.isfinite(D).all():
+        raise InvalidInputError("differences must be finite")
+    return D
+
+
+def _weights(w: Array, n_objectives: int | None = None) -> Array:
+    w = np.asarray(w, dtype=np.float64)
+    if w.ndim != 1 or n_objectives not in (None, len(w)) or not np.isfinite(w).all():
+        raise InvalidInputError(f"weights must be finite with shape (K,), got shape {w.shape}")
+    return w
