@@ -1,0 +1,208 @@
+"""What a recovery found, as one record: for the terminal, for JSON, for a recording."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from walking_irl.errors import InvalidInputError
+from walking_irl.types import Array, Iteration, Objective, Status
+
+SUCCESS = (
+    Status.MATCHED,
+    Status.CONVERGED,
+    Status.GAP_CLOSED,
+    Status.DOMINATED,
+    Status.MIXTURE_DOMINATES,
+)
+"""Endings that answer the question; any other leaves exit code 1."""
+INTERRUPTED = "interrupted"
+PACKAGES = ("walking-irl", "mujoco", "dm-control", "numpy", "scipy", "cvxpy", "rerun-sdk")
+
+
+def versions() -> dict[str, str]:
+    """Versions of this package and of those that decide its results."""
+    out = {}
+    for name in PACKAGES:
+        try:
+            out[name] = version(name)
+        except PackageNotFoundError:
+            out[name] = "not installed"
+    return out
+
+
+@dataclass
+class Report:
+    """Outcome of one recovery; hidden weights are known to it, never to the learner.
+
+    Attributes:
+        domain: Name of the domain.
+        objectives: Its objectives.
+        centre: Key of the centre.
+        mode: Mode of CPIRL.
+        seed: Seed, or None where weights were given.
+        w_expert: Hidden weights, shape (K,), or None for a demonstration of unknown weights.
+        iterations: All that CPIRL yielded.
+        expert_mu: The expert's feature expectations, shape (K,).
+        true_mu: Of the expert's optimal policy without noise, for scoring; or None.
+        recovered_mu: Of the best policy for the recovered weights, for scoring; or None.
+        seconds: Wall time by part [s].
+        recording: Path of the recording, if there is one.
+        was_interrupted: Whether Ctrl-C ended it.
+    """
+
+    domain: str
+    objectives: tuple[Objective, ...]
+    centre: str
+    mode: str
+    seed: int | None
+    w_expert: Array | None
+    expert_mu: Array
+    true_mu: Array | None = None
+    iterations: list[Iteration] = field(default_factory=list)
+    recovered_mu: Array | None = None
+    seconds: dict[str, float] = field(default_factory=dict)
+    recording: str | None = None
+    was_interrupted: bool = False
+
+    @property
+    def last(self) -> Iteration:
+        """The newest iteration.
+
+        Raises:
+            InvalidInputError: If there is none.
+        """
+        if not self.iterations:
+            raise InvalidInputError("the run ended before its first forward solve")
+        return self.iterations[-1]
+
+    @property
+    def w(self) -> Array:
+        """Recovered weights, shape (K,)."""
+        return self.last.estimate
+
+    @property
+    def status(self) -> str:
+        """Why the run ended, in one sentence."""
+        return INTERRUPTED if self.was_interrupted else self.ending.value
+
+    @property
+    def ending(self) -> Status:
+        """The status that ended the search, probes left aside."""
+        decisive = [it.status for it in self.iterations if it.status is not Status.PROBE]
+        return decisive[-1]
+
+    @property
+    def is_success(self) -> bool:
+        """Whether the run answers what the expert walks for."""
+        return not self.was_interrupted and self.ending in SUCCESS
+
+    @property
+    def contains_expert(self) -> bool | None:
+        """Whether the hidden weights lie inside the intervals."""
+        if self.w_expert is None:
+            return None
+        lower, upper = self.last.intervals.T
+        return bool(np.all((self.w_expert >= lower - 1e-9) & (self.w_expert <= upper + 1e-9)))
+
+    @property
+    def l1_error(self) -> float | None:
+        """Sum of the weights' absolute errors."""
+        return None if self.w_expert is None else float(np.abs(self.w - self.w_expert).sum())
+
+    def relative_loss(self, mu: Array | None) -> float | None:
+        """(J_E - J) / |J_E| of a policy under the hidden weights."""
+        if self.w_expert is None or self.true_mu is None or mu is None:
+            return None
+        J_E = float(self.w_expert @ self.true_mu)
+        return (J_E - float(self.w_expert @ mu)) / abs(J_E)
+
+    @property
+    def solves_to_1pct(self) -> int | None:
+        """Forward solves until some policy found lost less than 1 % under the hidden weights."""
+        for it in self.iterations:
+            loss = self.relative_loss(it.response.mu)
+            if loss is not None and loss < 0.01:
+                return it.k + 1
+        return None
+
+    def to_json(self) -> dict[str, Any]:
+        """Everything as plain JSON types."""
+        last = self.last
+        return {
+            "domain": self.domain,
+            "objectives": [o.name for o in self.objectives],
+            "centre": self.centre,
+            "mode": self.mode,
+            "seed": self.seed,
+            "w_expert": None if self.w_expert is None else self.w_expert.tolist(),
+            "w": self.w.tolist(),
+            "intervals": last.intervals.tolist(),
+            "contains_expert": self.contains_expert,
+            "l1_error": self.l1_error,
+            "relative_loss": self.relative_loss(self.recovered_mu),
+            "regret": last.best_regret,
+            "certificate": last.certificate,
+            "forward_solves": sum(it.status is not Status.PROBE for it in self.iterations),
+            "probe_solves": sum(it.status is Status.PROBE for it in self.iterations),
+            "solves_to_1pct": self.solves_to_1pct,
+            "status": self.status,
+            "seconds": self.seconds,
+            "history": [_entry(it) for it in self.iterations],
+            "recording": self.recording,
+            "versions": versions(),
+        }
+
+
+def _entry(it: Iteration) -> dict[str, Any]:
+    return {
+        "k": it.k,
+        "rule": it.rule.name.lower(),
+        "w": it.w.tolist(),
+        "mu": it.response.mu.tolist(),
+        "regret": it.regret,
+        "certificate": it.certificate,
+        "intervals": it.intervals.tolist(),
+        "estimate": it.estimate.tolist(),
+        "solver": {k: v for k, v in it.response.info.items() if isinstance(v, int | float | str)},
+    }
+
+
+def write_json(path: Path, content: dict[str, Any]) -> None:
+    """Write JSON beside the target and rename it, so that no half-written file stays.
+
+    Raises:
+        InvalidInputError: If the file cannot be written.
+    """
+    part = path.with_name(path.name + ".part")
+    try:
+        part.write_text(json.dumps(content, indent=1, allow_nan=True) + "\n")
+        os.replace(part, path)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise InvalidInputError(f"cannot write {path}: {error.strerror or error}") from error
+
+
+def check_folder(paths: Sequence[Path | None]) -> None:
+    """Fail before long work where a result could not be written after it.
+
+    Raises:
+        InvalidInputError: If a folder is missing or read-only, or a path is a folder.
+    """
+    for path in paths:
+        if path is None:
+            continue
+        folder = path.parent
+        if not folder.is_dir():
+            raise InvalidInputError(f"cannot write {path}: there is no folder {folder}")
+        if path.is_dir():
+            raise InvalidInputError(f"cannot write {path}: it is a folder; name a file")
+        if not os.access(folder, os.W_OK):
+            raise InvalidInputError(f"cannot write {path}: the folder {folder} is read-only")
