@@ -1,5 +1,9 @@
 """The drawn body: a picture shows it, its legs stay apart, its shoes stand on the floor."""
 
+import os
+import subprocess
+import sys
+
 import mujoco
 import numpy as np
 import pytest
@@ -75,6 +79,23 @@ def test_machine_without_opengl_says_what_to_install(monkeypatch):
     monkeypatch.setattr(mujoco, "Renderer", refuse)
     with pytest.raises(WalkingIRLError, match="install libegl1 .* or libosmesa6"):
         strip(load_walker(), load_gaits()["reference"], height=20, width=10)
+
+
+def test_pictures_need_no_screen_and_no_environment_variable():
+    """In a process of its own: MuJoCo reads the environment once."""
+    hidden = ("MUJOCO_GL", "DISPLAY", "WAYLAND_DISPLAY", "PYOPENGL_PLATFORM")
+    bare = {k: v for k, v in os.environ.items() if k not in hidden}
+    program = """
+from walking_irl.domains.humanoid.anatomy import load_walker
+from walking_irl.domains.humanoid.library import load_gaits
+from walking_irl.domains.humanoid.render import strip
+print(strip(load_walker(), load_gaits()["reference"], height=20, width=10).std() > 1)
+"""
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", program], env=bare, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip() == "True" and not done.stderr
 
 
 def test_impossible_sizes_are_refused():

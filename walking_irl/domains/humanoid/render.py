@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
+import importlib
 import os
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +25,7 @@ SIDE, FRONT, OBLIQUE = (90.0, -6.0), (180.0, -6.0), (140.0, -12.0)
 LOOK_AT_HEIGHT, CAMERA_DISTANCE = 0.90, 2.55  # [m]
 OVERSAMPLING = 2
 LOOK_GROUP = 2
+CONTEXT_MODULE = "mujoco.rendering.classic.gl_context"
 LEG = ("thigh", "shank", "foot")
 
 
@@ -153,6 +157,7 @@ def _renderer(model: mujoco.MjModel, height: int, width: int) -> Any:
             f"at most {glob.offheight // OVERSAMPLING} x {glob.offwidth // OVERSAMPLING}"
         )
     try:
+        _choose_headless_opengl()
         return mujoco.Renderer(model, height, width)
     except Exception as e:  # each OpenGL binding fails in its own way
         raise WalkingIRLError(
@@ -160,6 +165,21 @@ def _renderer(model: mujoco.MjModel, height: int, width: int) -> Any:
             f"(set MUJOCO_GL=osmesa); MUJOCO_GL is {os.environ.get('MUJOCO_GL') or 'unset'}, "
             f"and it says: {e}"
         ) from e
+
+
+def _choose_headless_opengl() -> None:
+    """Without a screen, and unless MUJOCO_GL says otherwise, draw with EGL, else with OSMesa.
+
+    MuJoCo decides when it is imported, and then for a screen: too early to know that there is none.
+    """
+    variables = ("MUJOCO_GL", "DISPLAY", "WAYLAND_DISPLAY")
+    if not sys.platform.startswith("linux") or any(os.environ.get(v) for v in variables):
+        return
+    for name in ("egl", "osmesa"):
+        with contextlib.suppress(ImportError, AttributeError, OSError, RuntimeError):
+            binding = importlib.import_module(f"mujoco.{name}")
+            importlib.import_module(CONTEXT_MODULE).GLContext = binding.GLContext  # type: ignore
+            return
 
 
 def _shrink(picture: Image) -> Image:
