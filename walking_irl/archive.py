@@ -1,80 +1,137 @@
-"""Everything that CPIRL has evaluated; each policy is a cut, whoever asked for it and why."""
+"""All that CPIRL has learnt: the policies evaluated, and what is known of the expert."""
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-
 import numpy as np
+from scipy.stats import t as student
 
+from walking_irl.errors import EmptyPolyhedronError, InvalidInputError, SolverError
 from walking_irl.polyhedron import WeightPolyhedron
 from walking_irl.types import Array, Expert, Response
 
-IDENTICAL = 1e-12
-"""Relative difference of feature expectations below which a policy is the demonstrated one."""
-
-
-class Query(NamedTuple):
-    """A weight vector asked for, and the policy found for it."""
-
-    w: Array
-    policy: Any
-    mu: Array
-    sensitivity: Array | None
+CONFIDENCE = 0.95
 
 
 class Archive:
-    """Queries, all evaluated feature expectations, and the expert that they are held against.
+    """Queries, policies and the expert's corner; every cut is rebuilt from it.
 
     Attributes:
-        mu_E: The expert's feature expectations as understood so far, shape (K,).
-        slack: By how much a policy may seem better than the expert, per feature: half-widths of
-            ``mu_E`` plus the expert's own suboptimality, shape (K,).
-        queries: In the order asked.
+        mu: The expert's feature expectations, less the measured defect; shape (K,).
+        error: Their confidence half-widths, shape (K,).
+        covariance: Of ``mu``, shape (K, K), or None where the expert is exact.
+        responses: The forward solver's answers, one for each query.
     """
 
-    def __init__(self, expert: Expert, min_weight: float = 0.0) -> None:
-        self.mu_E = np.array(expert.mu, dtype=float)
-        self.slack = np.asarray(expert.error, dtype=float) + expert.suboptimality
-        self.queries: list[Query] = []
-        self._everything: list[Array] = []
-        self._is_lazy: list[bool] = []
-        self._simplex = WeightPolyhedron.simplex(len(self.mu_E), min_weight)
-
-    def add(self, w: Array, response: Response) -> None:
-        """Keep a response with all policies evaluated on the way."""
-        self.queries.append(Query(w, response.policy, response.mu, response.sensitivity))
-        passed = [mu for mu in response.evaluated if np.isfinite(mu).all()]
-        self._everything += [response.mu, *passed]
-        self._is_lazy += [False] + [True] * len(passed)
+    def __init__(self, expert: Expert, min_weight: float) -> None:
+        self.expert = expert
+        self.min_weight = min_weight
+        self.mu = np.asarray(expert.mu, dtype=np.float64)
+        self.error = np.asarray(expert.error, dtype=np.float64)
+        self.covariance = expert.covariance
+        self.responses: list[Response] = []
+        self._W: list[Array] = []
+        self._spare = np.empty((0, len(self.mu)))
 
     @property
+    def K(self) -> int:
+        """Number of objectives."""
+        return len(self.mu)
+
+    @property
+    def W(self) -> Array:
+        """Queries, shape (n, K)."""
+        return np.array(self._W)
+
+    @property
+    def M(self) -> Array:
+        """Feature expectations of the queries' policies, shape (n, K)."""
+        return np.array([r.mu for r in self.responses])
+
+    def add(self, w: Array, response: Response) -> None:
+        """Remember a query and every policy evaluated for it.
+
+        Raises:
+            InvalidInputError: If the response's ``mu`` is not finite with shape (K,).
+        """
+        mu = np.asarray(response.mu)
+        if mu.shape != (self.K,) or not np.isfinite(mu).all():
+            raise InvalidInputError(f"forward solver returned mu {mu}; need {self.K} finite values")
+        self._W.append(np.asarray(w, dtype=np.float64))
+        self.responses.append(response)
+        if len(response.evaluated):
+            spare = np.asarray(response.evaluated, dtype=np.float64)
+            self._spare = np.r_[self._spare, spare[np.isfinite(spare).all(axis=1)]]
+
+    def values(self, w: Array) -> Array:
+        """V(w) = max_i w.mu_i over all policies evaluated; (..., K) -> (...)."""
+        best: Array = (w @ np.r_[self.M, self._spare].T).max(axis=-1)
+        return best
+
+    def scale(self, w: Array) -> Array:
+        """|w.mu_E|, the unit of relative tolerances; (..., K) -> (...)."""
+        unit: Array = np.asarray(w @ np.abs(self.mu))
+        return unit
+
+    def regrets(self, W: Array) -> Array:
+        """f(w) = V(w) - w.mu_E over all policies evaluated, for rows of ``W``; shape (n,)."""
+        f: Array = self.values(W) - W @ self.mu
+        return f
+
+    def is_match(self) -> Array:
+        """Which queries' policies are the demonstration itself, shape (n,)."""
+        same: Array = np.all(self.M == self.expert.mu, axis=1)
+        return same
+
     def differences(self) -> Array:
-        """d_i = mu_i - mu_E of every evaluated policy, shape (n, K)."""
-        return np.array(self._everything).reshape(-1, len(self.mu_E)) - self.mu_E
+        """Robust d_i = mu_i - (mu_E + e_E) of all policies, queries first; shape (n, K)."""
+        rows: Array = np.r_[self.M, self._spare] - (self.mu + self.error)
+        return rows
 
-    def polyhedron(self, level: float = 0.0) -> WeightPolyhedron:
-        """Weights for which no evaluated policy beats the expert by more than slack and level."""
-        if not self._everything:
-            return self._simplex
-        return self._simplex.cut_all(self.differences - self.slack - level, np.array(self._is_lazy))
+    def rows(self, lift: Array) -> Array:
+        """Cuts (d_i - eps_E - lift).w <= 0 of all policies evaluated, shape (n, K)."""
+        rows: Array = self.differences() - self.expert.suboptimality - lift
+        return rows
 
-    def regret(self, w: Array) -> float:
-        """f(w) = max_i w.(mu_i - mu_E), a lower bound of V(w) - w.mu_E."""
-        return float(np.max(self.differences @ w))
+    def polyhedron(self, lift: Array) -> WeightPolyhedron:
+        """Weights that satisfy every cut; an evaluated policy's is lazy unless it was queried.
 
-    def scale(self, w: Array) -> float:
-        """Size of the expert's return abs(w.mu_E), to which tolerances are relative."""
-        return max(abs(float(w @ self.mu_E)), 1e-12)
+        A policy with the expert's own features (within rounding) says nothing and is left out.
+        """
+        P = WeightPolyhedron.simplex(self.K, self.min_weight)
+        if not self.responses:
+            return P
+        d = self.differences() + self.error
+        says = np.abs(d).max(axis=1) > 1e-12 * max(float(np.abs(self.mu).max()), 1e-300)
+        is_lazy = np.arange(len(d)) >= len(self.responses)
+        return P.cut_all(self.rows(lift)[says], is_lazy[says])
 
-    def relative_regrets(self) -> Array:
-        """f(w_k) / abs(w_k.mu_E) of all queries."""
-        return np.array([self.regret(q.w) / self.scale(q.w) for q in self.queries])
+    def intervals(self, lift: Array) -> Array:
+        """Per-weight bounds, shape (K, 2).
 
-    def is_demonstration(self, q: Query) -> bool:
-        """Whether the solver found nothing but the demonstrated policy itself."""
-        return bool(np.abs(q.mu - self.mu_E).max() <= IDENTICAL * np.abs(self.mu_E).max())
+        Where the cuts leave nothing, the level is raised to the best regret: then the weights are
+        those for which the expert is at least as close to optimal as for the best query.
+        """
+        best = float(np.min(self.values(self.W) - self.W @ (self.mu + self.error)))
+        for level in (0.0, max(best, 0.0), max(best, 0.0) + 1e-6 * float(np.abs(self.mu).max())):
+            try:
+                return self.polyhedron(np.maximum(lift, level)).intervals()
+            except (EmptyPolyhedronError, SolverError):
+                continue
+        return np.tile([self.min_weight, 1.0], (self.K, 1))
 
-    def dominates(self, mu: Array) -> bool:
-        """Whether ``mu`` beats the expert: no feature worse, and one better."""
-        d = mu - self.mu_E
-        return bool(np.all(d >= 0) and np.any(d > IDENTICAL * np.abs(self.mu_E).max()))
+    def quantile(self, n_tests: int) -> float:
+        """Student's two-sided quantile for ``n_tests`` simultaneous intervals."""
+        df = max(self.expert.n_samples - 1, 1) if self.expert.n_samples else 10**6
+        return float(student.ppf(1.0 - (1.0 - CONFIDENCE) / (2 * n_tests), df))
+
+    def correct(self, defect: Array, covariance: Array) -> None:
+        """Lower the expert's mean by a measured defect and account for the defect's own error.
+
+        Args:
+            defect: Measured mean minus the solver's mu of one policy, shape (K,).
+            covariance: Of that mean, shape (K, K).
+        """
+        assert self.expert.covariance is not None
+        self.mu = self.expert.mu - defect
+        self.covariance = self.expert.covariance + covariance
+        self.error = self.quantile(self.K) * np.sqrt(np.maximum(np.diag(self.covariance), 0.0))

@@ -118,7 +118,8 @@ def ellipsoid_intervals(centre: Centre) -> Array:
     """Per-weight intervals from the outer ellipsoid, shape (K, 2): they contain P's (6.2.7)."""
     U = plane_basis(len(centre.w))
     half = centre.outer * np.sqrt(np.einsum("ij,jk,ik->i", U, centre.shape, U))
-    return np.c_[centre.w - half, centre.w + half]
+    bounds: Array = np.c_[centre.w - half, centre.w + half]
+    return bounds
 
 
 def diameter_bounds(centre: Centre) -> tuple[float, float]:
@@ -138,7 +139,7 @@ def volume_bound(D: Array, volume_ratio: float) -> float:
     if not 0.0 <= volume_ratio < 1.0:
         raise InvalidInputError(f"volume_ratio must lie in [0, 1), got {volume_ratio}")
     alpha = volume_ratio ** (1.0 / (D.shape[1] - 1))
-    return max(float(D.max()), 0.0) * alpha / (1.0 - alpha)
+    return float(max(D.max(), 0.0) * alpha / (1.0 - alpha))
 
 
 GRAVITY_RATE = -math.log(1.0 - 1.0 / math.e)

@@ -1,255 +1,188 @@
-r"""Cutting-Plane Inverse Reinforcement Learning (S. Balloccu, Politecnico di Milano).
+"""Cutting-Plane Inverse Reinforcement Learning: whose weights make this behaviour optimal?
 
-An expert that is optimal for hidden weights w_E beats every policy under them, so every policy
-evaluated cuts the simplex of weights: :math:`(\mu_i - \mu_E) \cdot w \le 0`. The algorithm asks for
-the best policy at the centre of what is left, cuts, and repeats. It is the cutting-plane method for
-the convex regret :math:`f(w) = V(w) - w \cdot \mu_E`, whose minimum is 0 at w_E; near it, a domain
-with sensitivities allows Newton steps on f instead of centres.
+Every policy pi satisfies w_E.mu(pi) <= w_E.mu_E for the expert's own weights, so each policy found
+cuts the simplex of weights: (mu_i - mu_E).w <= 0. The next query is a centre of what is left, and
+near the end, where the domain has sensitivities, a Newton step on the regret
+f(w) = max_pi w.mu(pi) - w.mu_E, which is convex and zero at w_E.
+
+Source: S. Balloccu, Cutting-Plane Inverse Reinforcement Learning (Politecnico di Milano),
+Algorithms 2 and 3.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from walking_irl.archive import Archive
 from walking_irl.centres import centre_rule
 from walking_irl.certificates import game_lp
-from walking_irl.errors import EmptyPolyhedronError, InvalidInputError
-from walking_irl.estimate import NoiseCorrection
-from walking_irl.newton import NewtonRule, Step, extremes
+from walking_irl.errors import InvalidInputError
+from walking_irl.guide import Decision, Guide, Measure, Mode, Tolerances
+from walking_irl.newton import extremes, standard_errors
 from walking_irl.polyhedron import WeightPolyhedron
+from walking_irl.stopping import StopRule
 from walking_irl.types import Array, Expert, Forward, Iteration, Response, Rule, Status
 
-MODES = ("optimal", "set", "minimise")
-WEIGHT_TOL = 2e-4
-"""L1 length of a Newton step below which the estimate of the weights stands."""
-FLOOR = 2e-5
-"""Relative regret that poor steps may leave: what the demonstration itself lacks."""
-SLACK = 2e-4
-"""How far a Newton query may lie outside the polyhedron, relative to the expert's return."""
-POOR_STEPS = 2
-
-Measure = Callable[[Any], tuple[Array, Array]]
+MODES: tuple[Mode, ...] = ("optimal", "set", "minimise")
+INTERVAL_FLOOR = 0.002
+"""Added to the standard errors of estimated weights: what secants leave of the Hessian's error."""
 
 
 def cpirl(
     forward: Forward,
     expert: Expert,
     *,
-    rng: np.random.Generator,
     centre: str = "ac",
-    mode: str = "optimal",
+    mode: Mode = "optimal",
     tol: float = 1e-6,
-    max_solves: int = 40,
+    tol_w: float | None = None,
+    max_solves: int = 60,
     min_weight: float = 0.0,
-    has_newton: bool = True,
-    has_probes: bool = False,
+    rng: np.random.Generator,
     measure: Measure | None = None,
     executor: Executor | None = None,
+    probe: float | None = None,
+    stop: Sequence[StopRule] = (),
 ) -> Iterator[Iteration]:
-    """Shrink the simplex of weights around those that explain the expert.
+    """Recover the weights under which an expert is optimal; one iteration per forward solve.
 
     Args:
-        forward: Best policy for weights, with its feature expectations.
-        expert: What is known of the expert; never its weights.
-        rng: Source of randomness of sampling centres.
-        centre: Which centre is queried: "ac", "cg", "mvie" or "cc".
-        mode: "optimal": the expert is optimal and cuts are at level 0 (Algorithm 2); "set": at
-            level ``tol``, for one weight vector under which the expert is that close to optimal
-            (Theorem A3); "minimise": at the best regret so far, for sub-optimal experts.
-        tol: Regret that counts as none, relative to the expert's return.
-        max_solves: Budget of forward solves, probes left aside.
+        forward: Solves "best policy for w"; picklable where an executor is given.
+        expert: What is known of the expert. With a ``covariance`` it counts as estimated.
+        centre: Key of the centre: ac, cg, mvie or cc.
+        mode: "optimal" keeps weights with f <= 0; "set" those with f <= tol |w.mu_E|; "minimise"
+            lowers f as far as it goes, for an expert that need not be optimal.
+        tol: Regret that counts as none, relative to |w.mu_E|.
+        tol_w: Newton step (L1) that counts as none; 2e-4 (exact) or 1e-3 (estimated) by default.
+        max_solves: Budget of forward solves, before probing.
         min_weight: Lower bound of every weight.
-        has_newton: Whether responses with sensitivities lead to Newton steps.
-        has_probes: Whether to finish with 2K solves at the predicted extremes of the weights that
-            the expert's suboptimality leaves possible: they tighten the intervals.
-        measure: Re-measures a learner's policy as the expert was measured: mean feature
-            expectations (K,) and their covariance (K, K). Removes the bias of noisy experts.
-        executor: Runs the probes side by side.
+        rng: Used by sampling centres, and to move a centre that repeats itself.
+        measure: Maps a policy to the mean (K,) and covariance (K, K) of its features when measured
+            as an estimated expert's were; the difference to its ``mu`` corrects the expert.
+        executor: Solves the probes side by side.
+        probe: Relative tolerance whose extreme weights are solved for at the end (2K solves), or
+            None for no probes.
+        stop: Further stop rules.
 
     Yields:
-        One iteration per forward solve; the last but the probes has a status other than CUT.
+        Immutable iterations; the last one's status says why the run ended.
 
     Raises:
-        InvalidInputError: If an argument is out of range, or a response has the wrong shape.
+        InvalidInputError: If an argument is out of range.
     """
-    search = _Search(expert, centre, mode, tol, min_weight, has_newton, measure, rng)
-    query = search.first()
-    for k in range(max_solves):
-        polyhedron, w, rule = query
+    _check(expert, mode, tol, max_solves, probe)
+    is_exact = expert.covariance is None
+    archive = Archive(expert, min_weight)
+    WeightPolyhedron.simplex(archive.K, min_weight)
+    step = tol_w if tol_w is not None else (2e-4 if is_exact else 1e-3)
+    tolerances = Tolerances(tol, step, 1e-7 if is_exact else 3e-3)
+    guide = Guide(archive, centre_rule(centre), mode, tolerances, measure, rng)
+    history: list[Iteration] = []
+    decision = Decision(guide.start(), Rule.CENTRE, np.empty(0), Status.CUT)
+    while decision.w is not None:
+        w, rule, P = decision.w, decision.rule, guide.polyhedron()
         response = forward(w)
-        before = search.best_regret()
-        search.add(w, response)
-        status, query = search.decide(w, rule, before)
-        if status is Status.CUT and k == max_solves - 1:
-            status = Status.BUDGET
-        last = search.iteration(k, polyhedron, w, rule, response, status)
-        yield last
-        if status is not Status.CUT:
-            break
-    if has_probes and status is Status.CONVERGED or status is Status.MATCHED and has_probes:
-        yield from search.probes(forward, last, executor)
+        archive.add(w, response)
+        decision = guide.decide(rule)
+        if decision.w is not None and len(history) + 1 >= max_solves:
+            decision = decision._replace(w=None, status=Status.BUDGET)
+        iteration = _iteration(guide, len(history), P, w, rule, response, decision, None)
+        for rule_ in stop:
+            status = rule_([*history, iteration])
+            if status is not None and decision.w is not None:
+                decision = decision._replace(w=None, status=status)
+        history.append(iteration)
+        is_last = decision.w is None and (probe is None or not _may_probe(decision.status))
+        yield replace(iteration, status=decision.status if is_last else Status.CUT)
+    if probe is not None and _may_probe(decision.status):
+        yield from _probe(forward, guide, decision, len(history), probe, executor)
 
 
-class _Search:
-    """State of a run: the archive, the two rules for the next query, and when to stop."""
+def _may_probe(status: Status) -> bool:
+    return status in (Status.MATCHED, Status.CONVERGED, Status.GAP_CLOSED)
 
-    def __init__(
-        self,
-        expert: Expert,
-        centre: str,
-        mode: str,
-        tol: float,
-        min_weight: float,
-        has_newton: bool,
-        measure: Measure | None,
-        rng: np.random.Generator,
-    ) -> None:
-        if mode not in MODES:
-            raise InvalidInputError(f"unknown mode {mode!r}; choose from {', '.join(MODES)}")
-        self.archive = Archive(expert, min_weight)
-        self.centre, self.mode, self.tol, self.rng = centre_rule(centre), mode, tol, rng
-        self.is_estimated = expert.covariance is not None
-        self.newton = NewtonRule(min_weight, self.is_estimated) if has_newton else None
-        self.correction = NoiseCorrection(expert, measure) if self.is_estimated else None
-        self.min_weight = min_weight
-        self.poor = 0
-        self.step: Step | None = None
 
-    def first(self) -> tuple[WeightPolyhedron, Array, Rule]:
-        P = self.archive.polyhedron()
-        return P, self.centre(P, rng=self.rng).w, Rule.CENTRE
+def _probe(
+    forward: Forward,
+    guide: Guide,
+    decision: Decision,
+    k: int,
+    probe: float,
+    executor: Executor | None,
+) -> Iterator[Iteration]:
+    """Solve at the extremes of {f <= probe |w.mu_E|}; each is a cut that tightens the intervals."""
+    archive, w = guide.archive, decision.estimate
+    if guide.model is not None:
+        drop = probe * float(archive.scale(w))
+        queries = extremes(w, guide.model.B, drop, archive.min_weight)
+    else:
+        eye = np.eye(archive.K)
+        P = archive.polyhedron(probe * np.abs(archive.mu))
+        queries = np.array([P.support(s * e)[1] for e in eye for s in (1.0, -1.0)])
+    responses = (map if executor is None else executor.map)(forward, list(queries))
+    for i, (query, response) in enumerate(zip(queries, responses, strict=True)):
+        P = archive.polyhedron(np.maximum(guide.lift(), probe * np.abs(archive.mu)))
+        archive.add(query, response)
+        status = decision.status if i == len(queries) - 1 else Status.PROBE
+        now = decision._replace(status=status)
+        yield _iteration(guide, k + i, P, query, Rule.PROBE, response, now, probe)
 
-    def best_regret(self) -> float:
-        return float(min(self.archive.relative_regrets(), default=np.inf))
 
-    def add(self, w: Array, response: Response) -> None:
-        if response.mu.shape != self.archive.mu_E.shape or not np.isfinite(response.mu).all():
-            raise InvalidInputError(
-                f"the forward solver must return {self.archive.mu_E.size} finite feature "
-                f"expectations, got {response.mu}"
-            )
-        self.archive.add(w, response)
+def _iteration(
+    guide: Guide,
+    k: int,
+    P: WeightPolyhedron,
+    w: Array,
+    rule: Rule,
+    response: Response,
+    decision: Decision,
+    probe: float | None,
+) -> Iteration:
+    archive = guide.archive
+    f = archive.regrets(archive.W)
+    return Iteration(
+        k=k,
+        polyhedron=P,
+        w=w,
+        rule=rule,
+        response=response,
+        regret=float(f[-1]),
+        best_regret=float(f.min()),
+        certificate=game_lp(archive.differences()).value,
+        intervals=_intervals(guide, decision, probe),
+        estimate=decision.estimate,
+        status=decision.status,
+    )
 
-    def level(self) -> float:
-        """Regret above which a weight vector is cut away."""
-        best = max(0.0, min(self.archive.regret(q.w) for q in self.archive.queries))
-        if self.mode == "minimise" or (self.correction and not self.correction.is_done):
-            return 1.25 * best if self.correction else best
-        return self.tol * self.archive.scale(self.archive.queries[-1].w) * (self.mode == "set")
 
-    def decide(
-        self, w: Array, rule: Rule, before: float
-    ) -> tuple[Status, tuple[WeightPolyhedron, Array, Rule]]:
-        """Why to stop, or CUT and the next query."""
-        archive = self.archive
-        q, regret = archive.queries[-1], archive.regret(w) / archive.scale(w)
-        if rule is Rule.NEWTON:
-            self.poor = self.poor + 1 if regret > 0.9 * before else 0
-        self.step = self.newton.step(archive) if self.newton else None
-        here = (archive.polyhedron(self.level()), w, rule)
-        if self.correction and self.step:
-            if self.correction.update(archive, self.step) and self.newton:
-                self.step = self.newton.step(archive)
-            if self.step and self.correction.has_settled(self.step):
-                return Status.CONVERGED, here
-        elif regret <= self.tol and not archive.is_demonstration(q) and not self.correction:
-            return Status.MATCHED, here
-        elif self.step and self.step.length <= WEIGHT_TOL:
-            return Status.CONVERGED, here
-        elif self.poor >= POOR_STEPS and self.best_regret() <= FLOOR:
-            return Status.CONVERGED, here
-        if self.mode == "minimise":
-            ended = self._minimised()
-            if ended is not None:
-                return ended, here
-        return self._next(here[0], w)
+def _intervals(guide: Guide, decision: Decision, probe: float | None) -> Array:
+    """Cut-based bounds; for an estimated expert near the end t standard errors + a floor."""
+    archive = guide.archive
+    if guide.is_exact or guide.model is None:
+        lift = guide.lift()
+        if probe is not None:
+            lift = np.maximum(lift, probe * np.abs(archive.mu))
+        return archive.intervals(lift)
+    assert archive.covariance is not None
+    half = archive.quantile(1) * standard_errors(guide.model.B, archive.covariance)
+    w = decision.estimate
+    bounds = np.c_[w - half - INTERVAL_FLOOR, w + half + INTERVAL_FLOOR]
+    return np.clip(bounds, archive.min_weight, 1.0)
 
-    def _minimised(self) -> Status | None:
-        """Endings of the search for the smallest regret of a sub-optimal expert."""
-        archive = self.archive
-        game = game_lp(archive.differences)
-        scale = archive.scale(archive.queries[-1].w)
-        if any(archive.dominates(q.mu) for q in archive.queries):
-            return Status.DOMINATED
-        if game.value <= -1e-9 * scale:
-            return Status.MIXTURE_DOMINATES
-        best = min(archive.regret(q.w) for q in archive.queries)
-        return Status.GAP_CLOSED if best + game.value <= self.tol * scale else None
 
-    def _next(
-        self, P: WeightPolyhedron, w: Array
-    ) -> tuple[Status, tuple[WeightPolyhedron, Array, Rule]]:
-        if self.step is not None and self.poor < POOR_STEPS:
-            v = self.step.w
-            rows = self.archive.differences - self.archive.slack - self.level()
-            if self.correction or np.max(rows @ v) <= SLACK * self.archive.scale(v):
-                return Status.CUT, (P, v, Rule.NEWTON)
-        self.poor = 0
-        try:
-            v = self.centre(P, rng=self.rng).w
-        except EmptyPolyhedronError as error:
-            is_flat = abs(error.radius) <= 1e-7
-            return (Status.MIXTURE_DOMINATES if is_flat else Status.EMPTY), (P, w, Rule.CENTRE)
-        stalled = float(np.abs(v - w).max()) <= 1e-10
-        return (Status.STALLED if stalled else Status.CUT), (P, v, Rule.CENTRE)
-
-    def iteration(
-        self,
-        k: int,
-        polyhedron: WeightPolyhedron,
-        w: Array,
-        rule: Rule,
-        response: Response,
-        status: Status,
-    ) -> Iteration:
-        archive = self.archive
-        return Iteration(
-            k=k,
-            polyhedron=polyhedron,
-            w=w,
-            rule=rule,
-            response=response,
-            regret=archive.regret(w),
-            best_regret=min(archive.regret(q.w) for q in archive.queries),
-            certificate=game_lp(archive.differences).value,
-            intervals=self.intervals(),
-            estimate=self.estimate(),
-            status=status,
+def _check(expert: Expert, mode: str, tol: float, max_solves: int, probe: float | None) -> None:
+    if mode not in MODES:
+        raise InvalidInputError(f"unknown mode {mode!r}; choose from {', '.join(MODES)}")
+    mu, error = np.asarray(expert.mu), np.asarray(expert.error)
+    if mu.ndim != 1 or error.shape != mu.shape or not np.isfinite(np.r_[mu, error]).all():
+        raise InvalidInputError(
+            f"the expert needs finite mu and error of one shape (K,), got {mu.shape}, {error.shape}"
         )
-
-    def estimate(self) -> Array:
-        """One more Newton step from the best query, else that query itself."""
-        if self.step is not None:
-            return self.step.w
-        return self.archive.queries[int(np.argmin(self.archive.relative_regrets()))].w
-
-    def intervals(self) -> Array:
-        """Bounds of each weight, (K, 2): by the cuts, or by error bars once noise is removed."""
-        if self.correction and self.correction.is_done and self.step:
-            return self.correction.intervals(self.step)
-        try:
-            return self.archive.polyhedron(self.level()).intervals()
-        except EmptyPolyhedronError:
-            return np.full((len(self.archive.mu_E), 2), np.nan)
-
-    def probes(
-        self, forward: Forward, last: Iteration, executor: Executor | None
-    ) -> Iterator[Iteration]:
-        """Solves at the predicted extremes of the weights that explain the expert."""
-        if self.step is None:
-            return
-        centre = self.estimate()
-        tolerance = float(np.mean(self.archive.slack))
-        W = extremes(centre, self.step.hessian, tolerance, self.min_weight)
-        answers = executor.map(forward, W) if executor else map(forward, W)
-        for k, (w, response) in enumerate(zip(W, answers, strict=True), start=last.k + 1):
-            polyhedron = self.archive.polyhedron(self.level())
-            self.add(w, response)
-            it = self.iteration(k, polyhedron, w, Rule.PROBE, response, Status.PROBE)
-            yield replace(it, estimate=centre, best_regret=last.best_regret)
+    if error.min() < 0.0 or expert.suboptimality < 0.0:
+        raise InvalidInputError("the expert's error and suboptimality must not be negative")
+    if not tol > 0.0 or max_solves < 1 or (probe is not None and not probe > 0.0):
+        raise InvalidInputError("tol, max_solves and probe must be positive")

@@ -136,8 +136,8 @@ class WeightPolyhedron:
         """Right-hand sides of A z <= b, shape (K + m,)."""
         K = self.n_objectives
         bounds = np.full(K, (1.0 / K - self.min_weight) / self._bound_norm)
-        bounds = np.r_[bounds, -self.cuts.mean(axis=1)]
-        return bounds
+        right: Array = np.r_[bounds, -self.cuts.mean(axis=1)]
+        return right
 
     @property
     def _bound_norm(self) -> float:

@@ -116,7 +116,7 @@ def _interior_point(A: Array, max_iter: int = 100) -> Ellipsoid:
     y = y / t**2
     z = np.maximum(0.1, slack - t * h)
     for _ in range(max_iter):
-        square: Array = np.linalg.inv((A.T * y) @ A)
+        square = np.linalg.inv((A.T * y) @ A)
         Q = A @ square @ A.T
         h = np.sqrt(np.diagonal(Q))
         gap = float(y @ z) / m
@@ -124,7 +124,7 @@ def _interior_point(A: Array, max_iter: int = 100) -> Ellipsoid:
         r1, r2, r3 = -A.T @ (y * h), slack - h - z, mu - y * z
         residual = max(np.abs(r1).max(), np.abs(r2).max(), np.abs(r3).max())
         if residual < GAP and gap < 10.0 * GAP:
-            return Ellipsoid(x, square)
+            return Ellipsoid(x, np.asarray(square, dtype=np.float64))
         y2h, YA = 2.0 * y * h, y[:, None] * A
         YQ = y[:, None] * Q
         G = YQ * YQ.T + np.diag(np.maximum(1e-12, y2h * z))

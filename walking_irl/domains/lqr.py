@@ -1,0 +1,102 @@
+"""Linear-quadratic regulator with K decoupled axes: every answer in closed form.
+
+x' = x + u per axis; objective i charges mostly the state of axis i and the inputs of the others:
+Q_i = diag(e, .., 1-e at i, .., e), R_i = diag(1-e, .., e at i, .., 1-e). Benchmark of the thesis's
+section 7.2; closed form by one scalar Riccati equation per axis.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from walking_irl.errors import InvalidInputError
+from walking_irl.types import Array, Expert, Objective, Response
+
+
+@dataclass(frozen=True)
+class LQR:
+    """The problem; ``name`` and ``objectives`` make it a Domain.
+
+    Attributes:
+        n_objectives: K, the number of axes.
+        mixing: e, how much of the other axes each objective charges.
+        discount: Discount factor.
+        start: Initial state of every axis.
+        policy_noise: Variance of white noise on the input.
+        perturbation: Relative error of a sub-optimal expert's gains; 0 for an optimal expert.
+    """
+
+    n_objectives: int = 3
+    mixing: float = 0.1
+    discount: float = 0.9
+    start: float = 10.0
+    policy_noise: float = 0.0
+    perturbation: float = 0.0
+
+    @property
+    def name(self) -> str:
+        """Name of the domain."""
+        return f"lqr{self.n_objectives}"
+
+    @property
+    def objectives(self) -> tuple[Objective, ...]:
+        """One objective per axis."""
+        meaning = "keep axis {} near zero, at the price of the others' inputs"
+        return tuple(
+            Objective(f"axis {i + 1}", "1", 1.0, meaning.format(i + 1))
+            for i in range(self.n_objectives)
+        )
+
+    def gains(self, w: Array) -> Array:
+        """Optimal feedback u = k x per axis for weights ``w``, shape (K,)."""
+        return self._gains_and_slopes(w)[0]
+
+    def _gains_and_slopes(self, w: Array) -> tuple[Array, Array]:
+        """Gains k_j(w_j) and dk_j/dw_j by implicit differentiation of the Riccati equation."""
+        e, g = self.mixing, self.discount
+        q, r = e + (1 - 2 * e) * w, (1 - e) - (1 - 2 * e) * w
+        b = g * q + (g - 1) * r
+        root = np.sqrt(b * b + 4 * g * q * r)
+        p = (b + root) / (2 * g)
+        k = -g * p / (r + g * p)
+        dq, dr = 1 - 2 * e, -(1 - 2 * e)
+        db = g * dq + (g - 1) * dr
+        dp = (db + (b * db + 2 * g * (dq * r + q * dr)) / root) / (2 * g)
+        dk = -g * (dp * r - p * dr) / (r + g * p) ** 2
+        return k, dk
+
+    def evaluate(self, k: Array) -> Array:
+        """Feature expectations of gains ``k``, shape (K,) -> (K,)."""
+        Q, R = self._charges()
+        P = (Q + R * k**2) / (1 - self.discount * (1 + k) ** 2)
+        noise = self.policy_noise / (1 - self.discount) * (R + self.discount * P).sum(axis=1)
+        mu: Array = -(self.start**2 * P).sum(axis=1) - noise
+        return mu
+
+    def _charges(self) -> tuple[Array, Array]:
+        e, eye = self.mixing, np.eye(self.n_objectives)
+        return e + (1 - 2 * e) * eye, (1 - e) - (1 - 2 * e) * eye
+
+    def forward(self, w: Array) -> Response:
+        """Optimal gains for ``w``, with d mu/d w = (d mu/d k) diag(dk/dw)."""
+        w = np.asarray(w, dtype=np.float64)
+        if w.shape != (self.n_objectives,):
+            raise InvalidInputError(f"weights must have shape ({self.n_objectives},)")
+        k, slope = self._gains_and_slopes(w)
+        Q, R = self._charges()
+        g = self.discount
+        closed = 1 - g * (1 + k) ** 2
+        dP = 2 * R * k / closed + (Q + R * k**2) * 2 * g * (1 + k) / closed**2
+        gain = self.start**2 + self.policy_noise * g / (1 - g)
+        sensitivity = -gain * dP * slope
+        return Response(k, self.evaluate(k), 0.5 * (sensitivity + sensitivity.T))
+
+    def expert(self, w_E: Array, rng: np.random.Generator) -> Expert:
+        """Exact features of the optimal gains, perturbed where ``perturbation`` > 0."""
+        k = self.gains(np.asarray(w_E, dtype=np.float64))
+        if self.perturbation > 0.0:
+            k = k * (1 + self.perturbation * rng.uniform(-1.0, 1.0, len(k)))
+            k = np.clip(k, -0.99, -0.1)
+        return Expert(self.evaluate(k), np.zeros(len(k)), demonstration=k)

@@ -1,0 +1,291 @@
+"""How CPIRL chooses its next query: a centre of the polyhedron, or a Newton step on the regret."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from walking_irl.archive import Archive
+from walking_irl.centres.centre import CentreRule
+from walking_irl.certificates import game_lp
+from walking_irl.errors import EmptyPolyhedronError, FlatPolyhedronError
+from walking_irl.newton import Step, newton_step, reduced, standard_errors, with_secants
+from walking_irl.polyhedron import WeightPolyhedron
+from walking_irl.types import Array, Rule, Status
+
+Mode = Literal["optimal", "set", "minimise"]
+Measure = Callable[[Any], tuple[Array, Array]]
+
+NEWTON_GAP = 0.02
+"""Newton's method takes over once the best regret is within this of optimal, relative."""
+SLACK = 2e-4
+"""By how much, relative to |w.mu_E|, a Newton query may miss a cut."""
+FLOOR = 2e-5
+"""Relative regret below which poor Newton steps mean the demonstration's own gap is reached."""
+LONGEST_STEP = 0.3
+"""Longest Newton step (L1) where min f is not known to be 0."""
+MEASURE_WITHIN, MEASURE_AGAIN, MOST_MEASUREMENTS = 0.1, 0.01, 2
+"""A learner's policy is measured once the step is below the first (L1), again if it moves."""
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """When CPIRL is done: relative regret, and the length (L1) of a step in the weights."""
+
+    regret: float
+    step: float
+    secant: float
+
+
+class Decision(NamedTuple):
+    """What to do next: the query (None at the end), its rule, and what is believed now."""
+
+    w: Array | None
+    rule: Rule
+    estimate: Array
+    status: Status
+
+
+class Model(NamedTuple):
+    """Quadratic model of the regret around the best query."""
+
+    best: int
+    B: Array
+    step: Step
+
+
+class Guide:
+    """Chooses queries from an archive; knows nothing of the forward solver."""
+
+    def __init__(
+        self,
+        archive: Archive,
+        centre: CentreRule,
+        mode: Mode,
+        tolerances: Tolerances,
+        measure: Measure | None,
+        rng: np.random.Generator,
+    ) -> None:
+        self.archive, self.mode, self.tolerances = archive, mode, tolerances
+        self.measure, self.rng = measure, rng
+        self.is_exact = archive.covariance is None
+        self.model: Model | None = None
+        self._centre = centre
+        self._prior: Array | None = None
+        self._n_poor = self._n_nudges = 0
+        self._best_before = np.inf
+        self._measured: list[Array] = []
+        self._steps: list[float] = []
+
+    def lift(self) -> Array:
+        """Level of the cuts: 0 ('optimal'), sigma ('set') or the best regret ('minimise')."""
+        archive = self.archive
+        if self.mode == "set":
+            return self.tolerances.regret * np.abs(archive.mu)
+        if self.mode == "minimise" and archive.responses:
+            f = archive.values(archive.W) - archive.W @ (archive.mu + archive.error)
+            return np.full(archive.K, max(float(f.min()), 0.0))
+        return np.zeros(archive.K)
+
+    def polyhedron(self) -> WeightPolyhedron:
+        """Weights that satisfy every cut at the present level."""
+        return self.archive.polyhedron(self.lift())
+
+    def start(self) -> Array:
+        """First query: the centre of all weights."""
+        return self._centre(self.polyhedron(), rng=self.rng).w
+
+    def decide(self, rule: Rule) -> Decision:
+        """Next query after the newest response, whose query was chosen by ``rule``."""
+        self.model = self._fit() if self._is_near() else None
+        status = self._stop_on_regret()
+        if status is not None:
+            return Decision(None, rule, self._estimate(), status)
+        if self.model is not None:
+            decision = self._newton(rule)
+            if decision is not None:
+                return decision
+        return self._next_centre()
+
+    def _relative_regrets(self) -> Array:
+        W = self.archive.W
+        scale = np.maximum(self.archive.scale(W), 1e-300)
+        relative: Array = self.archive.regrets(W) / scale
+        return relative
+
+    def _lower_bound(self) -> float:
+        """Lower bound on min f, relative: 0 for an optimal expert."""
+        if self.mode != "minimise":
+            return 0.0
+        value = game_lp(self.archive.differences()).value
+        return -value / max(float(np.abs(self.archive.mu).max()), 1e-300)
+
+    def _is_near(self) -> bool:
+        known = [r.sensitivity for r in self.archive.responses if r.sensitivity is not None]
+        if not known:
+            return False
+        if self.model is not None and not self.is_exact:
+            return True
+        W, archive = self.archive.W, self.archive
+        robust = archive.values(W) - W @ (archive.mu + archive.error)
+        is_noise = not self.is_exact and float(robust.min()) <= 0.0
+        return is_noise or float(self._relative_regrets().min()) - self._lower_bound() <= NEWTON_GAP
+
+    def _fit(self) -> Model:
+        """Model around the query that is predicted to be nearest to the minimum."""
+        archive, lo = self.archive, self.archive.min_weight
+        W, M = archive.W, archive.M
+        best = int(np.argmin(self._relative_regrets()))
+        usable = ~archive.is_match()
+        if not usable.any():
+            usable[:] = True
+        for _ in range(2):
+            self._update_prior(best)
+            assert self._prior is not None
+            B = with_secants(self._prior, W, M, best, self.tolerances.secant)
+            steps = [newton_step(w, mu - archive.mu, B, lo) for w, mu in zip(W, M, strict=True)]
+            distance = np.where(usable, [s.decrease for s in steps], np.inf)
+            best = int(np.argmin(distance))
+        self._update_prior(best)
+        B = with_secants(self._prior, W, M, best, self.tolerances.secant)
+        return Model(best, B, newton_step(W[best], M[best] - archive.mu, B, lo))
+
+    def _update_prior(self, best: int) -> None:
+        """Sensitivity at the best query, else the last one that could be trusted."""
+        sensitivity = self.archive.responses[best].sensitivity
+        if sensitivity is None and self._prior is None:
+            known = [r.sensitivity for r in self.archive.responses if r.sensitivity is not None]
+            sensitivity = known[-1]
+        if sensitivity is not None and np.isfinite(sensitivity).all():
+            self._prior = reduced(sensitivity)
+
+    def _estimate(self) -> Array:
+        if self.model is not None:
+            return self.model.step.w
+        return self.archive.W[int(np.argmin(self._relative_regrets()))]
+
+    def _stop_on_regret(self) -> Status | None:
+        """Stops that need no model: dominance, a match, a closed gap."""
+        archive, tol = self.archive, self.tolerances.regret
+        d = archive.differences()
+        scale = max(float(np.abs(archive.mu).max()), 1e-300)
+        if self.mode == "minimise":
+            is_above = (d >= 0.0).all(axis=1) & (d.max(axis=1) > tol * scale)
+            if is_above.any():
+                return Status.DOMINATED
+            if self.model is None or not self.is_exact:
+                f = float(
+                    np.min(archive.values(archive.W) - archive.W @ (archive.mu + archive.error))
+                )
+                t = game_lp(d).value
+                if f + t <= tol * scale:
+                    return Status.MIXTURE_DOMINATES if t < -tol * scale else Status.GAP_CLOSED
+            return None
+        w = archive.W[-1]
+        f = float(
+            archive.values(w) - w @ (archive.mu + archive.error + archive.expert.suboptimality)
+        )
+        if self.is_exact and archive.expert.suboptimality == 0.0 or self.model is not None:
+            f = float(self._relative_regrets()[-1] * archive.scale(w))
+        is_suspect = self.model is not None and bool(archive.is_match()[-1])
+        is_matched = f <= tol * float(archive.scale(w)) and not is_suspect
+        if is_matched and (self.model is None or self.is_exact):
+            return Status.MATCHED
+        return None
+
+    def _newton(self, rule: Rule) -> Decision | None:
+        """Newton query, or the end; None where a centre must be tried instead."""
+        assert self.model is not None
+        if not self.is_exact:
+            return self._newton_estimated()
+        archive, tol = self.archive, self.tolerances
+        f = self._relative_regrets()
+        is_poor = rule is Rule.NEWTON and float(f[-1]) > 0.9 * self._best_before
+        self._n_poor = self._n_poor + 1 if is_poor else (0 if rule is Rule.NEWTON else self._n_poor)
+        self._best_before = float(f.min())
+        best, _, step = self.model
+        w = archive.W[best]
+        if self._n_poor >= 2 and self._best_before - self._lower_bound() <= FLOOR:
+            return Decision(None, rule, step.w, Status.CONVERGED)
+        v = self._guarded(w, step, float(f[best] * archive.scale(w)))
+        if np.abs(v - w).sum() <= tol.step and not archive.is_match()[best]:
+            return Decision(None, rule, step.w, Status.CONVERGED)
+        if self._n_poor >= 2 or archive.is_match()[best]:
+            self._n_poor = 0
+            return None
+        rows = archive.rows(self.lift())
+        if float((rows @ v).max()) > SLACK * float(archive.scale(v)):
+            return None
+        return Decision(v, Rule.NEWTON, step.w, Status.CUT)
+
+    def _guarded(self, w: Array, step: Step, regret: float) -> Array:
+        """Shorten a step that promises more than f, whose minimum is known to be 0."""
+        move = step.w - w
+        if self.mode != "minimise":
+            ratio = step.decrease / max(regret, 1e-12 * float(self.archive.scale(w)))
+            return w + move / ratio if ratio > 3.0 else step.w
+        length = float(np.abs(move).sum())
+        return w + move * min(1.0, LONGEST_STEP / max(length, 1e-300))
+
+    def _newton_estimated(self) -> Decision:
+        """As :meth:`_newton` where mu_E is a sample mean: f may pass below 0, cuts say less."""
+        archive = self.archive
+        is_new = self._measure_defect()
+        assert self.model is not None and archive.covariance is not None
+        best, B, step = self.model
+        w = archive.W[best]
+        length = float(np.abs(step.w - w).sum())
+        self._steps.append(length)
+        noise = 0.5 * float(standard_errors(B, archive.covariance).sum())
+        is_measured = self.measure is None or bool(self._measured)
+        has_stalled = (
+            len(self._steps) >= 4
+            and not is_new
+            and min(self._steps[-2:]) > 0.7 * min(self._steps[:-2])
+        )
+        if is_measured and (length <= max(self.tolerances.step, noise) or has_stalled):
+            return Decision(None, Rule.NEWTON, step.w, Status.CONVERGED)
+        v = w + (step.w - w) * min(1.0, LONGEST_STEP / max(length, 1e-300))
+        return Decision(v, Rule.NEWTON, step.w, Status.CUT)
+
+    def _measure_defect(self) -> bool:
+        """Measure the best policy as the expert was measured, and correct the expert by it."""
+        assert self.model is not None
+        best, _, step = self.model
+        w = self.archive.W[best]
+        if self.measure is None or len(self._measured) >= MOST_MEASUREMENTS:
+            return False
+        if np.abs(step.w - w).sum() >= MEASURE_WITHIN:
+            return False
+        if self._measured and np.abs(w - self._measured[-1]).sum() <= MEASURE_AGAIN:
+            return False
+        response = self.archive.responses[best]
+        mean, covariance = self.measure(response.policy)
+        self.archive.correct(mean - response.mu, covariance)
+        self._measured.append(w)
+        self.model = self._fit()
+        return True
+
+    def _next_centre(self) -> Decision:
+        """Centre of the polyhedron, or the status that says why there is none."""
+        try:
+            w = self._centre(self.polyhedron(), rng=self.rng).w
+        except FlatPolyhedronError:
+            return Decision(None, Rule.CENTRE, self._estimate(), Status.GAP_CLOSED)
+        except EmptyPolyhedronError:
+            t = game_lp(self.archive.differences()).value
+            dominates = t < -1e-8 * float(np.abs(self.archive.mu).max())
+            status = Status.MIXTURE_DOMINATES if dominates else Status.EMPTY
+            return Decision(None, Rule.CENTRE, self._estimate(), status)
+        estimate = w if self.model is None and self.mode != "minimise" else self._estimate()
+        if np.abs(self.archive.W - w).max(axis=1).min() <= 1e-9:  # the centre repeats itself
+            self._n_nudges += 1
+            if self._n_nudges > 2:
+                return Decision(None, Rule.CENTRE, estimate, Status.STALLED)
+            v = self.rng.dirichlet(np.ones(self.archive.K))
+            corner = self.polyhedron().support(v - v.mean())[1]
+            w = 0.8 * w + 0.2 * corner
+        return Decision(w, Rule.CENTRE, estimate, Status.CUT)
