@@ -148,10 +148,11 @@ def test_held_actions_take_several_steps(walking):
 
 
 def test_time_limit_ends_the_episode_with_discount_one(walking):
-    env = make(walking, time_limit=0.2)
-    last = walk(env, walking[2], 14)
-    ends = [s for s in last if s.last()]
-    assert ends and ends[0].discount == 1.0
+    n_steps = 10
+    env = make(walking, time_limit=n_steps * walking[2].timestep)
+    steps = walk(env, walking[2], n_steps)
+    assert [s.last() for s in steps] == [False] * n_steps + [True]
+    assert steps[-1].discount == 1.0
 
 
 def test_nonsense_is_refused(walking):
