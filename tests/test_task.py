@@ -149,7 +149,7 @@ def test_held_actions_take_several_steps(walking):
 
 def test_time_limit_ends_the_episode_with_discount_one(walking):
     n_steps = 10
-    env = make(walking, time_limit=n_steps * walking[2].timestep)
+    env = make(walking, time_limit=(n_steps - 0.5) * walking[2].timestep)
     steps = walk(env, walking[2], n_steps)
     assert [s.last() for s in steps] == [False] * n_steps + [True]
     assert steps[-1].discount == 1.0
