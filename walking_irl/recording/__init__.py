@@ -1,0 +1,9 @@
+"""Recordings for the Rerun viewer; the only package that imports ``rerun``."""
+
+from __future__ import annotations
+
+from walking_irl.recording.experiment import Clock, Experiment
+from walking_irl.recording.files import check_writable
+from walking_irl.recording.writer import Recorder
+
+__all__ = ["Clock", "Experiment", "Recorder", "check_writable"]

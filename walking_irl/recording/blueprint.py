@@ -1,0 +1,95 @@
+"""What a person sees on opening a recording."""
+
+from __future__ import annotations
+
+import rerun.blueprint as rrb
+
+from walking_irl.recording import style
+from walking_irl.recording.experiment import Experiment
+from walking_irl.recording.panels import Panel, panels
+from walking_irl.recording.progress_view import BARS, FIGURES, ROW, weight_path
+
+
+def blueprint(experiment: Experiment, world: rrb.View | None) -> rrb.Blueprint:
+    """World left, polyhedron right; below intervals, certificate and a short text."""
+    shadows = [_shadow(panel) for panel in panels(experiment.names)]
+    top: list[rrb.View | rrb.Container] = [] if world is None else [world]
+    if shadows:
+        top.append(rrb.Horizontal(*shadows, name="Weights that explain the expert"))
+    shares = [[1.0], [1.0, max(0.7, 0.5 * len(shadows))]][len(top) - 1] if top else []
+    bottom = rrb.Horizontal(
+        rrb.Tabs(_bars(experiment), _history(experiment), active_tab=0),
+        _certificate(),
+        rrb.Tabs(
+            rrb.TextDocumentView(origin="/summary", name="What to look at"),
+            rrb.TextLogView(origin="/log", name="Log"),
+            _plots("/features", "Features"),
+            _plots("/joints", "Joints"),
+            active_tab=0,
+        ),
+        column_shares=[1.15, 1.0, 1.0],
+    )
+    rows = [rrb.Horizontal(*top, column_shares=shares), bottom] if top else [bottom]
+    return rrb.Blueprint(
+        rrb.Vertical(*rows, row_shares=[1.75, 1.0][: len(rows)]),
+        rrb.TimePanel(
+            timeline="frame", state="collapsed", fps=style.PLAYBACK_RATE, play_state="playing"
+        ),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.BlueprintPanel(state="collapsed"),
+        auto_views=False,
+        auto_layout=False,
+    )
+
+
+def _shadow(panel: Panel) -> rrb.View:
+    position, target = (2.35, 1.5, 0.55), (0.33, 0.33, -0.12)
+    if panel.is_flat:
+        position, target = (0.95, 0.43, 2.6), (0.95, 0.43, 0.0)
+    up = (0.0, 1.0, 0.0) if panel.is_flat else (0.0, 0.0, 1.0)
+    return rrb.Spatial3DView(
+        origin=f"/{panel.path}",
+        name=f"Weights: {panel.title}",
+        background=style.PAPER,
+        line_grid=False,
+        eye_controls=rrb.EyeControls3D(position=position, look_target=target, eye_up=up),
+    )
+
+
+def _bars(experiment: Experiment) -> rrb.View:
+    height = ROW * len(experiment.objectives)
+    return rrb.Spatial2DView(
+        origin=f"/{BARS}",
+        name="Intervals of the weights",
+        background=style.PAPER,
+        visual_bounds=rrb.VisualBounds2D(x_range=(-0.27, 1.04), y_range=(-0.07, height + 0.02)),
+    )
+
+
+def _history(experiment: Experiment) -> rrb.Container:
+    plots = [
+        rrb.TimeSeriesView(
+            origin=f"/{weight_path(name)}",
+            name=name,
+            plot_legend=rrb.PlotLegend(visible=False),
+            axis_y=rrb.ScalarAxis(range=(0.0, 1.0), zoom_lock=True),
+        )
+        for name in experiment.names
+    ]
+    return rrb.Grid(*plots, grid_columns=3, name="Intervals over time")
+
+
+def _certificate() -> rrb.View:
+    return rrb.TimeSeriesView(
+        origin="/cpirl/log10",
+        contents=[f"/cpirl/log10/{key}" for key in FIGURES if key != "regret"],
+        name="Certificate and regret (log10)",
+        plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
+        background=rrb.archetypes.PlotBackground(color=style.PAPER, show_grid=True),
+    )
+
+
+def _plots(origin: str, name: str) -> rrb.View:
+    return rrb.TimeSeriesView(
+        origin=origin, name=name, background=rrb.archetypes.PlotBackground(color=style.PAPER)
+    )

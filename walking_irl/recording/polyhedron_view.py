@@ -1,0 +1,238 @@
+"""The shrinking set of weights, drawn exactly for K = 3..7 objectives: ``/polyhedron``.
+
+Beside the true-scale picture stands a lens: the same picture about the estimate, magnified by a
+round factor that is written on it, so that the set stays visible when it has become tiny.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from walking_irl.errors import EmptyPolyhedronError
+from walking_irl.recording import style
+from walking_irl.recording.experiment import Clock, Experiment
+from walking_irl.recording.hulls import Hull, faces_lost, hull
+from walking_irl.recording.panels import Panel, panels
+from walking_irl.types import Array, Iteration
+
+LENS_RADIUS = 0.40
+LENS_CENTRE = np.array([0.0, 0.0, -0.62])
+"""Where the lens stands, relative to the middle of the frame's foot."""
+STEPS = np.array([1.0, 2.0, 5.0])
+"""Magnifications are these times powers of ten."""
+
+
+@dataclass(frozen=True, eq=False)
+class Lens:
+    """A magnifier: ``x -> place + zoom (x - focus)``."""
+
+    focus: Array
+    place: Array
+    zoom: float
+
+    def __call__(self, x: Array) -> Array:
+        """Magnified points, shape (..., 3)."""
+        seen: Array = self.place + self.zoom * (x - self.focus)
+        return seen
+
+
+def magnification(extent: float) -> float:
+    """Largest round factor that keeps ``extent`` within the lens, at least 1.
+
+    >>> magnification(0.03), magnification(3.0), magnification(1e-5)
+    (10.0, 1.0, 20000.0)
+    """
+    largest = LENS_RADIUS / max(extent, 1e-9)
+    if largest <= 1.0:
+        return 1.0
+    power = 10.0 ** np.floor(np.log10(largest))
+    return float(power * STEPS[STEPS * power <= largest * (1 + 1e-9)].max())
+
+
+class PolyhedronView:
+    """Logs the polyhedron of each iteration in every panel."""
+
+    def __init__(self, experiment: Experiment) -> None:
+        self.panels = panels(experiment.names)
+        self._w_expert = experiment.w_expert
+        self._before: dict[str, Hull] = {}
+
+    def log_static(self, stream: rr.RecordingStream) -> None:
+        """Log frames, names and styles."""
+        for panel in self.panels:
+            _log_frame(stream, panel)
+
+    def log_iteration(self, stream: rr.RecordingStream, clock: Clock, it: Iteration) -> None:
+        """Show the polyhedron in which the query was chosen, and fade what the last cut took away.
+
+        A set without interior has no vertices to draw: the picture before it stays.
+        """
+        if not self.panels:
+            return
+        try:
+            vertices = it.polyhedron.vertices()
+        except EmptyPolyhedronError:
+            return
+        for panel in self.panels:
+            after = hull(panel.project(vertices))
+            before = self._before.get(panel.path, after)
+            self._log_panel(stream, clock, panel, it, before, after)
+            self._before[panel.path] = after
+
+    def _log_panel(
+        self,
+        stream: rr.RecordingStream,
+        clock: Clock,
+        panel: Panel,
+        it: Iteration,
+        before: Hull,
+        after: Hull,
+    ) -> None:
+        clock.set(stream)
+        points = {"query": it.w, "estimate": it.estimate}
+        if self._w_expert is not None:
+            points["truth"] = self._w_expert
+        places = {name: panel.project(w) for name, w in points.items()}
+        lens = _lens(panel, places["estimate"], before)
+        _log_lens(stream, panel, lens)
+        for root, see in ((panel.path, None), (f"{panel.path}/lens", lens)):
+            _log_set(stream, root, after, see)
+            for name, x in places.items():
+                is_seen = see is None or bool(
+                    np.abs(see(x) - see.place).max() <= LENS_RADIUS * 1.001
+                )
+                _log_point(stream, f"{root}/{name}", name, x if see is None else see(x), is_seen)
+        self._fade(stream, clock, panel, before, after, lens)
+
+    def _fade(
+        self,
+        stream: rr.RecordingStream,
+        clock: Clock,
+        panel: Panel,
+        before: Hull,
+        after: Hull,
+        lens: Lens,
+    ) -> None:
+        faces = faces_lost(before, after) if not panel.is_flat else before.triangles
+        if len(faces) == 0:
+            return
+        edges = _edges_lost(before, after)
+        for step in range(style.FADE_STEPS + 1):
+            clock.set(stream, step * style.FADE_FRAMES // style.FADE_STEPS)
+            left = 1.0 - step / style.FADE_STEPS
+            for root, see in ((panel.path, None), (f"{panel.path}/lens", lens)):
+                at = before.points if see is None else see(before.points)
+                if left <= 0.0:
+                    stream.log(f"{root}/cut", rr.Clear(recursive=True))
+                    continue
+                stream.log(f"{root}/cut", _mesh(at, faces, style.CUT, 0.42 * left))
+                strips = edges if see is None else see(edges)
+                glow = rr.LineStrips3D(
+                    strips,
+                    colors=[style.with_alpha(style.CUT, left)],
+                    radii=rr.Radius.ui_points([1.0 + 1.5 * left]),
+                )
+                stream.log(f"{root}/cut/edges", glow)
+        clock.set(stream)
+
+
+def _lens(panel: Panel, focus: Array, before: Hull) -> Lens:
+    extent = float(np.abs(before.points - focus).max())
+    low, high = panel.corners.min(axis=0), panel.corners.max(axis=0)
+    place = np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]]) + LENS_CENTRE
+    if panel.is_flat:
+        place = np.array([high[0] + 1.4 * LENS_RADIUS, (low[1] + high[1]) / 2, 0.0])
+    return Lens(focus, place, magnification(extent))
+
+
+def _log_frame(stream: rr.RecordingStream, panel: Panel) -> None:
+    stream.log(panel.path, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    sides = np.array(list(combinations(panel.corners, 2)))
+    lines = rr.LineStrips3D(sides, colors=[style.FRAME], radii=rr.Radius.ui_points([1.0]))
+    stream.log(f"{panel.path}/frame", lines, static=True)
+    tips = rr.Points3D(
+        panel.tips,
+        labels=list(panel.labels),
+        colors=[style.INK],
+        radii=rr.Radius.ui_points([3.5]),
+        show_labels=True,
+    )
+    stream.log(f"{panel.path}/names", tips, static=True)
+
+
+def _log_lens(stream: rr.RecordingStream, panel: Panel, lens: Lens) -> None:
+    """The lens's box, the small box that it magnifies, and the lines between their corners."""
+    signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
+    if panel.is_flat:
+        signs = np.unique(signs * [1, 1, 0], axis=0)
+    big = lens.place + LENS_RADIUS * signs
+    small = lens.focus + LENS_RADIUS / lens.zoom * signs
+    pairs = [(i, j) for i, j in combinations(range(len(signs)), 2)
+             if np.count_nonzero(signs[i] != signs[j]) == 1]  # fmt: skip
+    boxes = np.array([[box[i], box[j]] for box in (big, small) for i, j in pairs])
+    rays = np.stack([small, big], axis=1)
+    strips = np.concatenate([boxes, rays])
+    alpha = [0.8] * len(boxes) + [0.18] * len(rays)
+    lines = rr.LineStrips3D(
+        strips,
+        colors=[style.with_alpha(style.FRAME, a) for a in alpha],
+        radii=rr.Radius.ui_points([1.0]),
+    )
+    stream.log(f"{panel.path}/lens/box", lines)
+    foot = lens.place - np.array([0.0, LENS_RADIUS, 0.0] if panel.is_flat else [0, 0, LENS_RADIUS])
+    label = rr.Points3D(
+        [foot],
+        labels=[f"magnified {lens.zoom:,.0f} x"],
+        colors=[style.FRAME],
+        radii=rr.Radius.ui_points([1.0]),
+        show_labels=True,
+    )
+    stream.log(f"{panel.path}/lens/scale", label)
+
+
+def _log_set(stream: rr.RecordingStream, root: str, body: Hull, see: Lens | None) -> None:
+    points, edges = body.points, body.edges
+    if see is not None:
+        points, edges = see(points), see(edges)
+    if len(body.triangles):
+        stream.log(f"{root}/set", _mesh(points, body.triangles, style.POLYHEDRON, 0.42))
+    else:
+        stream.log(f"{root}/set", rr.Clear(recursive=False))
+    lines = rr.LineStrips3D(edges, colors=[style.POLYHEDRON_EDGE], radii=rr.Radius.ui_points([1.2]))
+    stream.log(f"{root}/edges", lines)
+
+
+def _log_point(stream: rr.RecordingStream, path: str, name: str, x: Array, is_seen: bool) -> None:
+    colour = {"query": style.LEARNER, "estimate": style.ESTIMATE, "truth": style.EXPERT}[name]
+    size = {"query": 4.5, "estimate": 5.0, "truth": 6.0}[name]
+    point = rr.Points3D(
+        [x] if is_seen else np.empty((0, 3)), colors=[colour], radii=rr.Radius.ui_points([size])
+    )
+    stream.log(path, point)
+
+
+def _mesh(
+    points: Array, triangles: NDArray[np.uint32], colour: style.Colour, alpha: float
+) -> rr.Mesh3D:
+    return rr.Mesh3D(
+        vertex_positions=points,
+        triangle_indices=triangles,
+        albedo_factor=style.with_alpha(colour, alpha),
+    )
+
+
+def _edges_lost(before: Hull, after: Hull) -> Array:
+    """Edges of ``before`` that are not edges of ``after``."""
+    size = float(np.ptp(before.points, axis=0).max())
+    kept = np.array([np.sort(e, axis=0).ravel() for e in after.edges]).reshape(-1, 6)
+    is_lost = [
+        np.abs(kept - np.sort(e, axis=0).ravel()).max(axis=1).min(initial=np.inf) > 1e-6 * size
+        for e in before.edges
+    ]
+    lost: Array = before.edges[np.array(is_lost, dtype=bool)]
+    return lost

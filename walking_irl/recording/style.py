@@ -1,0 +1,37 @@
+"""Colours and sizes that mean the same in every view of a recording."""
+
+from __future__ import annotations
+
+Colour = tuple[int, int, int]
+
+LEARNER: Colour = (28, 98, 190)
+"""The query, the learner's curves."""
+ESTIMATE: Colour = (16, 140, 110)
+"""The best estimate of the weights."""
+EXPERT: Colour = (200, 30, 70)
+"""The truth: hidden weights, the expert's features and joints."""
+POLYHEDRON: Colour = (240, 160, 30)
+POLYHEDRON_EDGE: Colour = (176, 102, 0)
+CUT: Colour = (226, 50, 50)
+"""What the newest cut took away."""
+FRAME: Colour = (150, 154, 162)
+INK: Colour = (60, 64, 72)
+FORCE: Colour = (226, 88, 20)
+TRAIL: Colour = (28, 98, 190)
+PAPER: Colour = (248, 248, 246)
+
+PLAYBACK_RATE = 40.0
+"""Frames per second of ``sim_time`` [1/s]."""
+FADE_FRAMES = 48
+"""How long what a cut took away stays visible."""
+FADE_STEPS = 8
+"""In how many steps it fades."""
+
+
+def with_alpha(colour: Colour, alpha: float) -> tuple[int, int, int, int]:
+    """The colour with opacity ``alpha`` in [0, 1].
+
+    >>> with_alpha((1, 2, 3), 0.5)
+    (1, 2, 3, 128)
+    """
+    return (*colour, round(255 * alpha))

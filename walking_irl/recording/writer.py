@@ -1,0 +1,130 @@
+"""Records a run as it goes; the file appears at the end, complete, or not at all."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import TracebackType
+from typing import Generic, Self, TypeVar
+
+import rerun as rr
+
+from walking_irl.errors import RecordingError
+from walking_irl.recording.blueprint import blueprint
+from walking_irl.recording.experiment import Clock, Experiment
+from walking_irl.recording.files import check_writable, write_atomically
+from walking_irl.recording.polyhedron_view import PolyhedronView
+from walking_irl.recording.progress_view import ProgressView
+from walking_irl.recording.style import PLAYBACK_RATE
+from walking_irl.recording.summary import properties, summary
+from walking_irl.recording.world import WorldView
+from walking_irl.types import Iteration
+
+APPLICATION_ID = "walking_irl"
+FLUSH_SECONDS = 60.0
+FRAMES_WITHOUT_WORLD = round(1.5 * PLAYBACK_RATE)
+
+Motion = TypeVar("Motion")
+
+
+class Recorder(Generic[Motion]):
+    """Context manager that keeps a recording in memory and writes it when the block ends.
+
+    Also after an exception or Ctrl-C: the file then holds what was done until then and says so.
+
+    Args:
+        path: The ``.rrd`` file; whether it can be written is checked now.
+        experiment: What is known before the run.
+        world: What to show beside the polyhedron, or None.
+
+    Raises:
+        RecordingError: If ``path`` cannot be written, now or at the end, or Rerun is disabled.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        experiment: Experiment,
+        world: WorldView[Motion] | None = None,
+    ) -> None:
+        self.path = check_writable(path)
+        self.experiment = experiment
+        self.world = world
+        self._polyhedron = PolyhedronView(experiment)
+        self._progress = ProgressView(experiment)
+        self._last: Iteration | None = None
+        self._n_iterations = 0
+        self._n_frames = 0
+
+    def __enter__(self) -> Self:
+        self._stream = rr.RecordingStream(
+            APPLICATION_ID,
+            send_properties=False,
+            batcher_config=rr.ChunkBatcherConfig.NEVER(),
+        )
+        if not self._stream.is_enabled():
+            raise RecordingError(
+                "cannot record: Rerun is disabled by the environment variable RERUN; unset it"
+            )
+        self._stream.set_log_time_enabled(False)
+        self._memory = self._stream.memory_recording()
+        view = None if self.world is None else self.world.view()
+        self._stream.send_blueprint(blueprint(self.experiment, view))
+        self._stream.send_recording_name(_title(self.experiment))
+        if self.world is not None:
+            self.world.log_static(self._stream)
+        self._polyhedron.log_static(self._stream)
+        self._progress.log_static(self._stream)
+        self._stream.flush(timeout_sec=FLUSH_SECONDS)
+        return self
+
+    def iteration(self, it: Iteration, motion: Motion | None = None) -> None:
+        """Show one iteration, and the walk (or other motion) of its policy."""
+        clock = Clock(self._n_frames, it.k)
+        self._progress.log_iteration(self._stream, clock, it)
+        self._polyhedron.log_iteration(self._stream, clock, it)
+        self._last, self._n_iterations = it, self._n_iterations + 1
+        self._play(clock, motion, is_last=False)
+
+    def finale(self, motion: Motion) -> None:
+        """Show the motion of the recovered weights, for longer, as part of the last iteration."""
+        k = 0 if self._last is None else self._last.k
+        self._play(Clock(self._n_frames, k), motion, is_last=True)
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        ending = None if kind is None else _ending(kind)
+        try:
+            self._save(ending)
+        except RecordingError as failure:
+            if error is None:
+                raise
+            error.add_note(str(failure))  # the first error matters more
+
+    def _play(self, clock: Clock, motion: Motion | None, is_last: bool) -> None:
+        n_frames = FRAMES_WITHOUT_WORLD
+        if self.world is not None and motion is not None:
+            n_frames = self.world.log_iteration(self._stream, clock, motion, is_last)
+        self._n_frames = clock.first + n_frames
+        self._stream.flush(timeout_sec=FLUSH_SECONDS)
+
+    def _save(self, ending: str | None) -> None:
+        world = "" if self.world is None else self.world.describe()
+        text = summary(self.experiment, self._last, world, ending)
+        markdown = rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)
+        self._stream.log("summary", markdown, static=True)
+        values = properties(self.experiment, self._last, self._n_iterations, ending)
+        self._stream.send_property("experiment", rr.AnyValues(**values))
+        write_atomically(self.path, self._memory.drain_as_bytes())
+
+
+def _title(experiment: Experiment) -> str:
+    seed = "" if experiment.seed is None else f", seed {experiment.seed}"
+    return f"{experiment.domain}{seed}"
+
+
+def _ending(kind: type[BaseException]) -> str:
+    return "interrupted" if kind is KeyboardInterrupt else kind.__name__
