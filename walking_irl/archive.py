@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from walking_irl.errors import EmptyPolyhedronError, InvalidInputError, SolverError
@@ -77,9 +78,9 @@ class Archive:
         f: Array = self.values(W) - W @ self.mu
         return f
 
-    def is_match(self) -> Array:
+    def is_match(self) -> NDArray[np.bool_]:
         """Which queries' policies are the demonstration itself, shape (n,)."""
-        same: Array = np.all(self.M == self.expert.mu, axis=1)
+        same: NDArray[np.bool_] = np.all(self.M == self.expert.mu, axis=1)
         return same
 
     def differences(self) -> Array:

@@ -171,7 +171,8 @@ def _intervals(guide: Guide, decision: Decision, probe: float | None) -> Array:
     half = archive.quantile(1) * standard_errors(guide.model.B, archive.covariance)
     w = decision.estimate
     bounds = np.c_[w - half - INTERVAL_FLOOR, w + half + INTERVAL_FLOOR]
-    return np.clip(bounds, archive.min_weight, 1.0)
+    clipped: Array = np.clip(bounds, archive.min_weight, 1.0)
+    return clipped
 
 
 def _check(expert: Expert, mode: str, tol: float, max_solves: int, probe: float | None) -> None:

@@ -143,17 +143,16 @@ class Guide:
         if not usable.any():
             usable[:] = True
         for _ in range(2):
-            self._update_prior(best)
-            assert self._prior is not None
-            B = with_secants(self._prior, W, M, best, self.tolerances.secant)
+            prior = self._update_prior(best)
+            B = with_secants(prior, W, M, best, self.tolerances.secant)
             steps = [newton_step(w, mu - archive.mu, B, lo) for w, mu in zip(W, M, strict=True)]
             distance = np.where(usable, [s.decrease for s in steps], np.inf)
             best = int(np.argmin(distance))
-        self._update_prior(best)
-        B = with_secants(self._prior, W, M, best, self.tolerances.secant)
+        prior = self._update_prior(best)
+        B = with_secants(prior, W, M, best, self.tolerances.secant)
         return Model(best, B, newton_step(W[best], M[best] - archive.mu, B, lo))
 
-    def _update_prior(self, best: int) -> None:
+    def _update_prior(self, best: int) -> Array:
         """Sensitivity at the best query, else the last one that could be trusted."""
         sensitivity = self.archive.responses[best].sensitivity
         if sensitivity is None and self._prior is None:
@@ -161,11 +160,14 @@ class Guide:
             sensitivity = known[-1]
         if sensitivity is not None and np.isfinite(sensitivity).all():
             self._prior = reduced(sensitivity)
+        assert self._prior is not None, "some query had a finite sensitivity"
+        return self._prior
 
     def _estimate(self) -> Array:
         if self.model is not None:
             return self.model.step.w
-        return self.archive.W[int(np.argmin(self._relative_regrets()))]
+        best: Array = self.archive.W[int(np.argmin(self._relative_regrets()))]
+        return best
 
     def _stop_on_regret(self) -> Status | None:
         """Stops that need no model: dominance, a match, a closed gap."""

@@ -1,0 +1,132 @@
+"""What trajectories say of an expert: mean features, confidence half-widths, its optimality gap.
+
+Half-widths hold with probability ``confidence`` for all K features at once, so that every cut
+built from the corner mu + error + suboptimality keeps the expert's weights.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, Literal
+
+import numpy as np
+from scipy.stats import t as student
+
+from walking_irl.errors import InvalidInputError
+from walking_irl.types import Array, Expert, Response
+
+Bound = Literal["student", "bernstein", "hoeffding"]
+
+
+def half_widths(
+    returns: Array,
+    *,
+    bound: Bound = "student",
+    confidence: float = 0.95,
+    ranges: Array | None = None,
+    n_policies: int = 1,
+) -> Array:
+    """Half-widths e with |mean - mu| <= e for all features and policies at once, shape (K,).
+
+    With delta = 1 - confidence, N policies, K features, m samples of range C_j and s.d. s_j:
+    Hoeffding C sqrt(ln(2KN/delta)/(2m)); empirical Bernstein (Maurer and Pontil 2009)
+    sqrt(2 s^2 L/m) + 7 C L/(3(m-1)), L = ln(4KN/delta); Student t_{1-delta/(2KN), m-1} s/sqrt(m).
+    Student's is the practical one (it assumes near-normal means); Hoeffding's needs > 1e4 samples.
+
+    Args:
+        returns: Features of independent trajectories, shape (m, K).
+        bound: Which inequality.
+        confidence: Probability that all half-widths hold, in (0, 1).
+        ranges: Length C_j of the interval that holds each feature, shape (K,); for the
+            distribution-free bounds.
+        n_policies: Number N of policies that are estimated like this one.
+
+    Raises:
+        InvalidInputError: If there are fewer than 2 trajectories, or the range is missing.
+    """
+    returns = _returns(returns)
+    m, K = returns.shape
+    if not 0.0 < confidence < 1.0 or n_policies < 1:
+        raise InvalidInputError("confidence must lie in (0, 1) and n_policies be positive")
+    delta, deviation = 1.0 - confidence, returns.std(axis=0, ddof=1)
+    if bound == "student":
+        quantile = float(student.ppf(1.0 - delta / (2 * K * n_policies), m - 1))
+        widths: Array = quantile * deviation / math.sqrt(m)
+        return widths
+    if bound not in ("bernstein", "hoeffding"):
+        raise InvalidInputError(
+            f"unknown bound {bound!r}; choose from bernstein, hoeffding, student"
+        )
+    if ranges is None:
+        raise InvalidInputError(f"the {bound} bound needs the features' ranges, shape ({K},)")
+    C = np.asarray(ranges, dtype=np.float64)
+    if bound == "hoeffding":
+        widths = C * math.sqrt(math.log(2 * K * n_policies / delta) / (2 * m))
+        return widths
+    L = math.log(4 * K * n_policies / delta)
+    widths = deviation * math.sqrt(2 * L / m) + 7 * C * L / (3 * (m - 1))
+    return widths
+
+
+def expert_from_returns(
+    returns: Array,
+    *,
+    bound: Bound = "student",
+    confidence: float = 0.95,
+    ranges: Array | None = None,
+    suboptimality: float = 0.0,
+    demonstration: Any = None,
+) -> Expert:
+    """Expert known by independent trajectories; ``returns`` has shape (m, K)."""
+    returns = _returns(returns)
+    return Expert(
+        mu=returns.mean(axis=0),
+        error=half_widths(returns, bound=bound, confidence=confidence, ranges=ranges),
+        suboptimality=suboptimality,
+        covariance=np.cov(returns.T).reshape(returns.shape[1], -1) / len(returns),
+        n_samples=len(returns),
+        demonstration=demonstration,
+    )
+
+
+def paired_half_widths(learner: Array, expert: Array, *, confidence: float = 0.95) -> Array:
+    """Half-widths of mu - mu_E from trajectories with common random numbers, shape (K,).
+
+    Evaluating both on the same initial states cancels what they share.
+
+    Args:
+        learner: Features from the same initial states as the expert's, shape (m, K).
+        expert: Shape (m, K).
+        confidence: Probability that all half-widths hold.
+    """
+    learner, expert = _returns(learner), _returns(expert)
+    if learner.shape != expert.shape:
+        raise InvalidInputError(f"paired features differ in shape: {learner.shape}, {expert.shape}")
+    return half_widths(learner - expert, confidence=confidence)
+
+
+def robust_corner(expert: Expert) -> Array:
+    """Upper corner mu_E + e_E + eps_E: cuts (mu_i - e_i - corner).w <= 0 keep w_E; shape (K,)."""
+    corner: Array = np.asarray(expert.mu) + expert.error + expert.suboptimality
+    return corner
+
+
+def suboptimality_from_restarts(w: Array, mu: Array, restarts: Sequence[Response]) -> float:
+    """eps_E: by how much the best of several solves at ``w`` beats the policy with ``mu``.
+
+    For a synthetic expert pass its own weights; blind, solves at an estimate of them and twice
+    the result.
+    """
+    if not restarts:
+        raise InvalidInputError("need at least one restart")
+    return max(0.0, max(float(w @ r.mu) for r in restarts) - float(w @ mu))
+
+
+def _returns(returns: Array) -> Array:
+    returns = np.asarray(returns, dtype=np.float64)
+    if returns.ndim != 2 or len(returns) < 2 or not np.isfinite(returns).all():
+        raise InvalidInputError(
+            f"features must be finite with shape (m >= 2, K), got {returns.shape}"
+        )
+    return returns

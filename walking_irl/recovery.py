@@ -1,0 +1,100 @@
+"""Summary of a run of CPIRL: the weights, how sure they are, and what limits them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from walking_irl.errors import InvalidInputError
+from walking_irl.newton import reduced
+from walking_irl.polyhedron import WeightPolyhedron, plane_basis
+from walking_irl.types import Array, Expert, Iteration, Objective, Status
+
+
+@dataclass(frozen=True)
+class Recovery:
+    """What a run found; see :func:`summarise`.
+
+    Attributes:
+        w: Representative weights, shape (K,).
+        rule: How they were chosen, in words.
+        intervals: Per-weight bounds, shape (K, 2), relative to the policies evaluated.
+        certificate: Some mixture of the policies found loses at most this much to the expert.
+        bracket: (-t_k, best regret): bounds on the least regret of any weights; 0 inside means
+            that the expert may be optimal.
+        volume_ratio: Volume of the last polyhedron over the whole simplex's.
+        condition_number: Of the regret's Hessian, or None where no sensitivity is known.
+        weakest: The trade-off that the behaviour reveals least, or None.
+        noise: Confidence half-widths of the expert's features, shape (K,).
+        n_solves: Forward solves, probes included.
+        status: Why the run ended.
+    """
+
+    w: Array
+    rule: str
+    intervals: Array
+    certificate: float
+    bracket: tuple[float, float]
+    volume_ratio: float
+    condition_number: float | None
+    weakest: str | None
+    noise: Array
+    n_solves: int
+    status: Status
+
+
+def summarise(
+    iterations: Sequence[Iteration], expert: Expert, objectives: Sequence[Objective] = ()
+) -> Recovery:
+    """Summary of the iterations of one run.
+
+    Args:
+        iterations: All that :func:`~walking_irl.cpirl.cpirl` yielded, at least one.
+        expert: The expert it was given.
+        objectives: For names in words; numbered where missing.
+
+    Raises:
+        InvalidInputError: If there is no iteration.
+    """
+    if not iterations:
+        raise InvalidInputError("nothing to summarise: no forward solve was finished")
+    last = iterations[-1]
+    K = len(last.w)
+    names = [o.name for o in objectives] or [f"objective {i + 1}" for i in range(K)]
+    condition, weakest = _identifiability(iterations, names)
+    whole = WeightPolyhedron.simplex(K, last.polyhedron.min_weight)
+    return Recovery(
+        w=last.estimate,
+        rule=(
+            "centre of the remaining weights, or best query"
+            if condition is None
+            else "Newton step from the best query where it applies"
+        ),
+        intervals=last.intervals,
+        certificate=last.certificate,
+        bracket=(-last.certificate, last.best_regret),
+        volume_ratio=last.polyhedron.volume() / whole.volume(),
+        condition_number=condition,
+        weakest=weakest,
+        noise=np.asarray(expert.error),
+        n_solves=len(iterations),
+        status=last.status,
+    )
+
+
+def _identifiability(
+    iterations: Sequence[Iteration], names: Sequence[str]
+) -> tuple[float | None, str | None]:
+    """Condition number of the Hessian nearest the estimate, and its weakest direction."""
+    known = [i for i in iterations if i.response.sensitivity is not None]
+    if not known:
+        return None, None
+    nearest = min(known, key=lambda i: float(np.abs(i.w - iterations[-1].estimate).sum()))
+    assert nearest.response.sensitivity is not None
+    values, vectors = np.linalg.eigh(reduced(nearest.response.sensitivity))
+    direction = plane_basis(len(names)) @ vectors[:, 0]
+    direction = direction * np.sign(direction[np.argmax(np.abs(direction))])
+    for_, against = int(np.argmax(direction)), int(np.argmin(direction))
+    return float(values[-1] / values[0]), f"{names[for_]} against {names[against]}"
