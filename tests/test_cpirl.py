@@ -1,0 +1,197 @@
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from problems import TWO_POLICIES, without_sensitivity
+
+from walking_irl.cpirl import cpirl
+from walking_irl.domains.lqr import LQR
+from walking_irl.errors import InvalidInputError
+from walking_irl.expert import expert_from_returns, half_widths
+from walking_irl.recovery import summarise
+from walking_irl.types import Expert, Rule, Status
+
+
+def hidden(seed, K):
+    rng = np.random.default_rng(seed)
+    return rng.dirichlet(np.ones(K)), rng
+
+
+def test_lqr_matches_the_published_front():
+    noisy = LQR(2, policy_noise=1.0)
+    mu = noisy.forward(np.array([0.0, 1.0])).mu
+    np.testing.assert_allclose(mu, [-306.5027, -152.3688], atol=1e-3)
+    for K, value in ((2, -158.8403), (3, -203.1817), (5, -279.8584)):
+        np.testing.assert_allclose(LQR(K).forward(np.full(K, 1 / K)).mu, value, atol=1e-3)
+
+
+@pytest.mark.parametrize(("K", "curvature"), [(2, 95.00), (3, 120.01), (5, 170.33)])
+def test_lqr_sensitivity_is_the_derivative_of_mu(K, curvature):
+    problem, w, h = LQR(K), np.full(K, 1 / K), 1e-5
+    direction = np.zeros(K)
+    direction[:2] = 1.0, -1.0
+    S = problem.forward(w).sensitivity
+    numeric = (problem.forward(w + h * direction).mu - problem.forward(w - h * direction).mu) / (
+        2 * h
+    )
+    projected = S @ direction - (S @ direction).mean()
+    np.testing.assert_allclose(projected, numeric - numeric.mean(), rtol=1e-6, atol=1e-6)
+    assert direction @ S @ direction / 2 == pytest.approx(curvature, abs=0.1)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("K", [2, 3, 5, 8])
+def test_newton_recovers_lqr_weights_in_12_solves(K, seed):
+    w_E, rng = hidden(seed, K)
+    problem = LQR(K)
+    expert = problem.expert(w_E, rng)
+    run = list(cpirl(problem.forward, expert, rng=rng, max_solves=12))
+    assert run[-1].status in (Status.MATCHED, Status.CONVERGED)
+    assert all(float(w_E @ (i.response.mu - expert.mu)) <= 1e-9 for i in run)
+    assert np.abs(run[-1].estimate - w_E).max() <= 1e-3
+    lo, hi = run[-1].intervals.T
+    assert np.all((lo <= w_E + 1e-7) & (w_E <= hi + 1e-7))
+
+
+@pytest.mark.parametrize("centre", ["ac", "cg", "mvie", "cc"])
+def test_cutting_planes_alone_recover_lqr_weights(centre):
+    w_E, rng = hidden(0, 3)
+    expert = LQR(3).expert(w_E, rng)
+    run = list(cpirl(without_sensitivity(LQR(3)), expert, centre=centre, rng=rng, max_solves=25))
+    assert all(i.polyhedron.contains(w_E, 1e-9) for i in run)
+    assert all(i.rule is Rule.CENTRE for i in run)
+    assert np.abs(run[-1].estimate - w_E).max() <= 0.01
+
+
+@pytest.mark.parametrize(("K", "solves"), [(2, 12), (3, 12), (5, 20), (8, 20)])
+def test_analytic_centre_alone_recovers_lqr_weights_within(K, solves):
+    for seed in range(3):
+        w_E, rng = hidden(seed, K)
+        expert = LQR(K).expert(w_E, rng)
+        run = list(cpirl(without_sensitivity(LQR(K)), expert, rng=rng, max_solves=solves))
+        assert np.abs(run[-1].estimate - w_E).max() <= 0.01
+
+
+def test_robust_cuts_keep_the_weights_that_naive_cuts_lose():
+    problem, kept_robust, kept_naive, n = LQR(3), 0, 0, 40
+    for seed in range(n):
+        w_E, rng = hidden(seed, 3)
+        mu = problem.forward(w_E).mu
+        noisy = expert_from_returns(mu * (1 + 0.02 * rng.standard_normal((20, 3))))
+        naive = Expert(noisy.mu, np.zeros(3))
+        for kind, expert in (("robust", noisy), ("naive", naive)):
+            run = list(cpirl(without_sensitivity(problem), expert, rng=rng, max_solves=15))
+            cuts = np.array([i.response.mu - expert.mu - expert.error for i in run])
+            kept = float((cuts @ w_E).max()) <= 1e-9
+            kept_robust += kept and kind == "robust"
+            kept_naive += kept and kind == "naive"
+    assert kept_robust >= 0.95 * n
+    assert kept_naive <= 0.7 * n
+
+
+def test_measured_defect_removes_a_bias_of_the_measurement():
+    problem, covered, errors = LQR(4), 0, {True: [], False: []}
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        w_E = 0.05 + 0.8 * rng.dirichlet(np.ones(4))
+        bias = np.array([1.02, 1.0, 1.0, 1.01])
+
+        def sample(k, rng=rng, bias=bias):
+            mu = problem.evaluate(k)
+            return mu * bias * (1 + 0.002 * rng.standard_normal((20, 4)))
+
+        def measure(k, sample=sample):
+            X = sample(k)
+            return X.mean(axis=0), np.cov(X.T) / len(X)
+
+        expert = expert_from_returns(sample(problem.gains(w_E)))
+        for is_measured in (True, False):
+            run = list(
+                cpirl(problem.forward, expert, rng=rng, measure=measure if is_measured else None)
+            )
+            errors[is_measured].append(np.abs(run[-1].estimate - w_E).sum())
+            lo, hi = run[-1].intervals.T
+            covered += is_measured * int(((lo <= w_E) & (w_E <= hi)).sum())
+    assert covered >= 0.95 * 40
+    assert np.mean(errors[True]) < 0.5 * np.mean(errors[False])
+
+
+@pytest.mark.parametrize("K", [2, 3, 5])
+def test_level_mode_dominates_suboptimal_experts(K):
+    for seed in range(4):
+        w_E, rng = hidden(seed, K)
+        problem = LQR(K, perturbation=0.25)
+        expert = problem.expert(w_E, rng)
+        last = list(cpirl(problem.forward, expert, mode="minimise", rng=rng, max_solves=30))[-1]
+        assert last.status is Status.DOMINATED
+        assert np.all(last.response.mu >= expert.mu)
+
+
+def test_set_mode_returns_weights_that_explain_the_expert():
+    w_E, rng = hidden(0, 3)
+    expert = LQR(3).expert(w_E, rng)
+    run = list(cpirl(without_sensitivity(LQR(3)), expert, mode="set", tol=1e-3, rng=rng))
+    assert run[-1].status is Status.MATCHED
+    assert run[-1].regret <= 1e-3 * abs(run[-1].w @ expert.mu)
+    assert all(i.polyhedron.contains(w_E) for i in run)
+
+
+def test_probes_tighten_intervals_around_the_truth_and_use_the_executor():
+    w_E, rng = hidden(1, 3)
+    expert = LQR(3).expert(w_E, rng)
+    plain = list(cpirl(LQR(3).forward, expert, rng=rng))
+    with ThreadPoolExecutor(2) as executor:
+        run = list(cpirl(LQR(3).forward, expert, rng=rng, probe=1e-4, executor=executor))
+    probes = [i for i in run if i.rule is Rule.PROBE]
+    assert len(probes) == 6
+    assert [i.status for i in run[:-1]].count(Status.PROBE) == 5
+    lo, hi = run[-1].intervals.T
+    assert np.all((lo <= w_E) & (w_E <= hi))
+    assert (hi - lo).max() < np.diff(plain[-1].intervals).max()
+
+
+def test_two_policy_counterexample_ends_with_a_dominating_mixture():
+    expert = Expert(np.array([0.4, 0.4]), np.zeros(2))
+    for mode in ("optimal", "minimise"):
+        run = list(cpirl(TWO_POLICIES.forward, expert, mode=mode, rng=np.random.default_rng(0)))
+        assert len(run) == 2
+        assert run[-1].status is Status.MIXTURE_DOMINATES
+        assert run[-1].certificate == pytest.approx(-0.1)
+
+
+def test_runs_are_deterministic_and_interruptible():
+    w_E, rng = hidden(2, 5)
+    expert = LQR(5).expert(w_E, rng)
+    first = list(cpirl(LQR(5).forward, expert, rng=np.random.default_rng(0)))
+    run = cpirl(LQR(5).forward, expert, rng=np.random.default_rng(0))
+    again = next(run)
+    run.close()
+    np.testing.assert_array_equal(first[0].w, again.w)
+    np.testing.assert_array_equal(
+        [i.w for i in first],
+        [i.w for i in cpirl(LQR(5).forward, expert, rng=np.random.default_rng(0))],
+    )
+
+
+def test_summary_names_the_weakest_trade_off():
+    w_E, rng = hidden(0, 3)
+    problem = LQR(3)
+    expert = problem.expert(w_E, rng)
+    recovery = summarise(list(cpirl(problem.forward, expert, rng=rng)), expert, problem.objectives)
+    assert recovery.bracket[0] <= 0.0 <= recovery.bracket[1]
+    assert 0.0 < recovery.volume_ratio < 1.0
+    assert recovery.weakest is not None
+    assert " against " in recovery.weakest
+
+
+def test_half_widths_cover_and_bad_input_is_named():
+    rng = np.random.default_rng(0)
+    X = rng.random((200, 500, 3))
+    for bound in ("student", "bernstein", "hoeffding"):
+        inside = [
+            np.all(np.abs(x.mean(0) - 0.5) <= half_widths(x, bound=bound, ranges=np.ones(3)))
+            for x in X
+        ]
+        assert np.mean(inside) >= 0.92
+    with pytest.raises(InvalidInputError, match="unknown mode"):
+        next(cpirl(LQR(3).forward, LQR(3).expert(np.ones(3) / 3, rng), mode="best", rng=rng))
