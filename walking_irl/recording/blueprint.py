@@ -12,7 +12,8 @@ from walking_irl.recording.progress_view import BARS, FIGURES, ROW, weight_path
 
 def blueprint(experiment: Experiment, world: rrb.View | None) -> rrb.Blueprint:
     """World left, polyhedron right; below intervals, certificate and a short text."""
-    shadows = [_shadow(panel) for panel in panels(experiment.names)]
+    shown = panels(experiment.names)
+    shadows = [_shadow(panel, len(shown)) for panel in shown]
     top: list[rrb.View | rrb.Container] = [] if world is None else [world]
     if shadows:
         top.append(rrb.Horizontal(*shadows, name="Weights that explain the expert"))
@@ -42,10 +43,12 @@ def blueprint(experiment: Experiment, world: rrb.View | None) -> rrb.Blueprint:
     )
 
 
-def _shadow(panel: Panel) -> rrb.View:
-    position, target = (2.35, 1.5, 0.55), (0.33, 0.33, -0.12)
+def _shadow(panel: Panel, n_panels: int) -> rrb.View:
+    position, target = (2.45, 1.6, 0.62), (0.3, 0.3, -0.03)
     if panel.is_flat:
-        position, target = (0.95, 0.43, 2.6), (0.95, 0.43, 0.0)
+        position, target = (0.92, 0.43, 1.85), (0.92, 0.43, 0.0)
+    elif n_panels > 2:  # narrow views
+        position = (3.0, 2.0, 0.75)
     up = (0.0, 1.0, 0.0) if panel.is_flat else (0.0, 0.0, 1.0)
     return rrb.Spatial3DView(
         origin=f"/{panel.path}",
@@ -85,7 +88,7 @@ def _certificate() -> rrb.View:
         contents=[f"/cpirl/log10/{key}" for key in FIGURES if key != "regret"],
         name="Certificate and regret (log10)",
         plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
-        background=rrb.archetypes.PlotBackground(color=style.PAPER, show_grid=True),
+        background=rrb.archetypes.PlotBackground(color=style.PAPER, show_grid=False),
     )
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import rerun as rr
@@ -13,8 +15,10 @@ from walking_irl.recording.experiment import Clock
 from walking_irl.recording.motion import Frames, check_rollout, play
 from walking_irl.types import Array, Rollout
 
-FORCE_SCALE = 0.8e-3  # [m/N]
-GHOST = style.with_alpha(style.EXPERT, 0.30)
+FORCE_SCALE = 1.0e-3  # [m/N]
+GHOST = style.with_alpha(style.GHOST, 0.62)
+BESIDE = 0.9
+"""How far to the learner's left the ghost walks [m]."""
 TRAIL_FRAMES = 80
 CYCLES, LAST_CYCLES = 2, 8
 """Gait cycles played per iteration."""
@@ -27,7 +31,7 @@ LONG_SECONDS, LAST_LONG_SECONDS = 2.4, 9.0
 class WalkerView:
     """Shows walks of one body.
 
-    Learner and ghost start every iteration at the same place and the same phase, and then walk at
+    Learner and ghost start every iteration side by side and in the same phase, and then walk at
     their own pace: what differs is what can be seen. The learner never jumps in x.
 
     Args:
@@ -49,7 +53,7 @@ class WalkerView:
         log_body(stream, self.model, "world/walker")
         if self.expert is not None:
             log_body(stream, self.model, "world/expert", GHOST)
-        arrows = rr.Arrows3D.from_fields(colors=[style.FORCE], radii=[0.014])
+        arrows = rr.Arrows3D.from_fields(colors=[style.FORCE], radii=[0.018])
         stream.log("world/contacts", arrows, static=True)
         trail = rr.Points3D.from_fields(colors=[style.TRAIL], radii=[0.009])
         stream.log("world/com_trail", trail, static=True)
@@ -78,7 +82,7 @@ class WalkerView:
         angles = [learner.q]
         if self.expert is not None:
             ghost = play(self.model, self.expert, n, self._x)
-            self._log_walker(stream, clock, "world/expert", ghost)
+            self._log_walker(stream, clock, "world/expert", beside(ghost))
             angles.append(ghost.q)
         self._log_joints(stream, clock, np.stack(angles, axis=2))
         self._x += distance(motion, n)
@@ -94,7 +98,7 @@ class WalkerView:
         return rrb.Spatial3DView(
             origin="/world/follow",
             contents=["/world/**"],
-            name="Walking: learner (solid), expert (red ghost)",
+            name="Walking: learner, and the expert as a red ghost",
             background=style.PAPER,
             line_grid=rrb.LineGrid3D(
                 visible=True,
@@ -103,7 +107,7 @@ class WalkerView:
                 plane=rr.components.Plane3D.XY,
             ),
             eye_controls=rrb.EyeControls3D(
-                position=(2.0, -2.5, 1.35), look_target=(0.1, 0, 0.86), eye_up=(0, 0, 1)
+                position=(2.0, -1.6, 1.2), look_target=(0.0, 0.4, 0.84), eye_up=(0, 0, 1)
             ),
             overrides={"/world/com_trail": [rrb.VisibleTimeRanges([since])]},
         )
@@ -139,6 +143,11 @@ class WalkerView:
         hinge = mujoco.mjtJoint.mjJNT_HINGE
         is_hinge = self.model.jnt_type == hinge
         return [(j, self.model.joint(j).name) for j in np.flatnonzero(is_hinge).tolist()]
+
+
+def beside(ghost: Frames) -> Frames:
+    """The same walk, moved to the learner's left."""
+    return replace(ghost, position=ghost.position + [0.0, BESIDE, 0.0])
 
 
 def _joint_path(name: str) -> str:

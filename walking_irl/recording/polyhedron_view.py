@@ -1,7 +1,7 @@
 """The shrinking set of weights, drawn exactly for K = 3..7 objectives: ``/polyhedron``.
 
-Beside the true-scale picture stands a lens: the same picture about the estimate, magnified by a
-round factor that is written on it, so that the set stays visible when it has become tiny.
+As soon as the set is small, a lens stands beside the true-scale picture: the same picture about the
+set, magnified by a round factor that is written on it, so that it stays visible when it is tiny.
 """
 
 from __future__ import annotations
@@ -20,10 +20,11 @@ from walking_irl.recording.hulls import Hull, faces_lost, hull
 from walking_irl.recording.panels import Panel, panels
 from walking_irl.types import Array, Iteration
 
-LENS_RADIUS = 0.40
-LENS_CENTRE = np.array([0.0, 0.0, -0.62])
+LENS_RADIUS = 0.32
+LENS_CENTRE = np.array([-0.2, -0.2, -0.72])
 """Where the lens stands, relative to the middle of the frame's foot."""
-STEPS = np.array([1.0, 2.0, 5.0])
+LABEL_DROP = 1.25 * LENS_RADIUS
+STEPS = np.array([1.0, 2.0, 3.0, 5.0, 7.0])
 """Magnifications are these times powers of ten."""
 
 
@@ -98,9 +99,12 @@ class PolyhedronView:
         if self._w_expert is not None:
             points["truth"] = self._w_expert
         places = {name: panel.project(w) for name, w in points.items()}
-        lens = _lens(panel, places["estimate"], before)
-        _log_lens(stream, panel, lens)
-        for root, see in ((panel.path, None), (f"{panel.path}/lens", lens)):
+        lens = _lens(panel, before)
+        if lens is None:
+            stream.log(f"{panel.path}/lens", rr.Clear(recursive=True))
+        else:
+            _log_lens(stream, panel, lens)
+        for root, see in _pictures(panel, lens):
             _log_set(stream, root, after, see)
             for name, x in places.items():
                 is_seen = see is None or bool(
@@ -116,7 +120,7 @@ class PolyhedronView:
         panel: Panel,
         before: Hull,
         after: Hull,
-        lens: Lens,
+        lens: Lens | None,
     ) -> None:
         faces = faces_lost(before, after) if not panel.is_flat else before.triangles
         if len(faces) == 0:
@@ -125,29 +129,40 @@ class PolyhedronView:
         for step in range(style.FADE_STEPS + 1):
             clock.set(stream, step * style.FADE_FRAMES // style.FADE_STEPS)
             left = 1.0 - step / style.FADE_STEPS
-            for root, see in ((panel.path, None), (f"{panel.path}/lens", lens)):
+            for root, see in _pictures(panel, lens):
                 at = before.points if see is None else see(before.points)
                 if left <= 0.0:
                     stream.log(f"{root}/cut", rr.Clear(recursive=True))
                     continue
                 stream.log(f"{root}/cut", _mesh(at, faces, style.CUT, 0.42 * left))
                 strips = edges if see is None else see(edges)
-                glow = rr.LineStrips3D(
-                    strips,
-                    colors=[style.with_alpha(style.CUT, left)],
-                    radii=rr.Radius.ui_points([1.0 + 1.5 * left]),
+                glow = rr.LineStrips3D(  # lines are always opaque: they shrink, then vanish
+                    strips if left > 0.5 else strips[:0],
+                    colors=[style.CUT],
+                    radii=rr.Radius.ui_points([2.6 * left]),
                 )
                 stream.log(f"{root}/cut/edges", glow)
         clock.set(stream)
 
 
-def _lens(panel: Panel, focus: Array, before: Hull) -> Lens:
+def _pictures(panel: Panel, lens: Lens | None) -> list[tuple[str, Lens | None]]:
+    """Entity path and lens of each picture that the panel shows now."""
+    true_scale: list[tuple[str, Lens | None]] = [(panel.path, None)]
+    return true_scale if lens is None else [*true_scale, (f"{panel.path}/lens", lens)]
+
+
+def _lens(panel: Panel, before: Hull) -> Lens | None:
+    """A lens about the set, or None while that fills much of the frame by itself."""
+    focus = (before.points.max(axis=0) + before.points.min(axis=0)) / 2
     extent = float(np.abs(before.points - focus).max())
+    zoom = magnification(extent)
+    if zoom < 2.0:
+        return None
     low, high = panel.corners.min(axis=0), panel.corners.max(axis=0)
     place = np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]]) + LENS_CENTRE
     if panel.is_flat:
         place = np.array([high[0] + 1.4 * LENS_RADIUS, (low[1] + high[1]) / 2, 0.0])
-    return Lens(focus, place, magnification(extent))
+    return Lens(focus, place, zoom)
 
 
 def _log_frame(stream: rr.RecordingStream, panel: Panel) -> None:
@@ -155,18 +170,12 @@ def _log_frame(stream: rr.RecordingStream, panel: Panel) -> None:
     sides = np.array(list(combinations(panel.corners, 2)))
     lines = rr.LineStrips3D(sides, colors=[style.FRAME], radii=rr.Radius.ui_points([1.0]))
     stream.log(f"{panel.path}/frame", lines, static=True)
-    tips = rr.Points3D(
-        panel.tips,
-        labels=list(panel.labels),
-        colors=[style.INK],
-        radii=rr.Radius.ui_points([3.5]),
-        show_labels=True,
-    )
+    tips = _text(panel.tips, list(panel.labels))
     stream.log(f"{panel.path}/names", tips, static=True)
 
 
 def _log_lens(stream: rr.RecordingStream, panel: Panel, lens: Lens) -> None:
-    """The lens's box, the small box that it magnifies, and the lines between their corners."""
+    """The lens's box, the small box that it magnifies, and its scale."""
     signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
     if panel.is_flat:
         signs = np.unique(signs * [1, 1, 0], axis=0)
@@ -175,24 +184,16 @@ def _log_lens(stream: rr.RecordingStream, panel: Panel, lens: Lens) -> None:
     pairs = [(i, j) for i, j in combinations(range(len(signs)), 2)
              if np.count_nonzero(signs[i] != signs[j]) == 1]  # fmt: skip
     boxes = np.array([[box[i], box[j]] for box in (big, small) for i, j in pairs])
-    rays = np.stack([small, big], axis=1)
-    strips = np.concatenate([boxes, rays])
-    alpha = [0.8] * len(boxes) + [0.18] * len(rays)
-    lines = rr.LineStrips3D(
-        strips,
-        colors=[style.with_alpha(style.FRAME, a) for a in alpha],
-        radii=rr.Radius.ui_points([1.0]),
-    )
+    lines = rr.LineStrips3D(boxes, colors=[style.LENS], radii=rr.Radius.ui_points([1.0]))
     stream.log(f"{panel.path}/lens/box", lines)
-    foot = lens.place - np.array([0.0, LENS_RADIUS, 0.0] if panel.is_flat else [0, 0, LENS_RADIUS])
-    label = rr.Points3D(
-        [foot],
-        labels=[f"magnified {lens.zoom:,.0f} x"],
-        colors=[style.FRAME],
-        radii=rr.Radius.ui_points([1.0]),
-        show_labels=True,
-    )
-    stream.log(f"{panel.path}/lens/scale", label)
+    foot = lens.place - LABEL_DROP * np.array([0, 1, 0] if panel.is_flat else [0, 0, 1])
+    stream.log(f"{panel.path}/lens/scale", _text(foot[None], [f"magnified {lens.zoom:,.0f} x"]))
+
+
+def _text(at: Array, labels: list[str]) -> rr.Points3D:
+    """Text alone, at points of shape (n, 3)."""
+    none = rr.Radius.ui_points([0.0])
+    return rr.Points3D(at, labels=labels, colors=[style.LABEL], radii=none, show_labels=True)
 
 
 def _log_set(stream: rr.RecordingStream, root: str, body: Hull, see: Lens | None) -> None:
@@ -200,7 +201,7 @@ def _log_set(stream: rr.RecordingStream, root: str, body: Hull, see: Lens | None
     if see is not None:
         points, edges = see(points), see(edges)
     if len(body.triangles):
-        stream.log(f"{root}/set", _mesh(points, body.triangles, style.POLYHEDRON, 0.42))
+        stream.log(f"{root}/set", _mesh(points, body.triangles, style.POLYHEDRON, 0.28))
     else:
         stream.log(f"{root}/set", rr.Clear(recursive=False))
     lines = rr.LineStrips3D(edges, colors=[style.POLYHEDRON_EDGE], radii=rr.Radius.ui_points([1.2]))

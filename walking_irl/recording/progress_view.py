@@ -110,7 +110,7 @@ class ProgressView:
             rr.LineStrips2D(bars, colors=[style.POLYHEDRON], radii=thick, draw_order=10.0),
         )
         for name, w, colour, size in (
-            ("query", it.w, style.LEARNER, 4.5),
+            ("query", it.w, style.LEARNER, 6.5),
             ("estimate", it.estimate, style.ESTIMATE, 4.0),
         ):
             dots = rr.Points2D(
@@ -153,7 +153,7 @@ def _log_style(
 
 def _log_labels(stream: rr.RecordingStream, name: str, at: Array, labels: list[str]) -> None:
     points = rr.Points2D(
-        at, labels=labels, colors=[style.INK], radii=rr.Radius.ui_points([0.0]), show_labels=True
+        at, labels=labels, colors=[style.LABEL], radii=rr.Radius.ui_points([0.0]), show_labels=True
     )
     stream.log(f"{BARS}/{name}", points, static=True)
 

@@ -10,15 +10,19 @@ ESTIMATE: Colour = (16, 140, 110)
 """The best estimate of the weights."""
 EXPERT: Colour = (200, 30, 70)
 """The truth: hidden weights, the expert's features and joints."""
+GHOST: Colour = (232, 128, 150)
 POLYHEDRON: Colour = (240, 160, 30)
 POLYHEDRON_EDGE: Colour = (176, 102, 0)
 CUT: Colour = (226, 50, 50)
 """What the newest cut took away."""
 FRAME: Colour = (150, 154, 162)
+LENS: Colour = (120, 150, 200)
 INK: Colour = (60, 64, 72)
 FORCE: Colour = (226, 88, 20)
 TRAIL: Colour = (28, 98, 190)
 PAPER: Colour = (248, 248, 246)
+LABEL: Colour = (255, 255, 255)
+"""Text; the viewer puts it on a dark plate."""
 
 PLAYBACK_RATE = 40.0
 """Frames per second of ``sim_time`` [1/s]."""
