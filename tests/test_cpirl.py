@@ -1,4 +1,5 @@
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,8 @@ from walking_irl.cpirl import cpirl
 from walking_irl.domains.lqr import LQR
 from walking_irl.errors import InvalidInputError
 from walking_irl.expert import expert_from_returns, half_widths
+from walking_irl.newton import reduced
+from walking_irl.polyhedron import plane_basis
 from walking_irl.recovery import summarise
 from walking_irl.types import Expert, Rule, Status
 
@@ -148,6 +151,41 @@ def test_probes_tighten_intervals_around_the_truth_and_use_the_executor():
     lo, hi = run[-1].intervals.T
     assert np.all((lo <= w_E) & (w_E <= hi))
     assert (hi - lo).max() < np.diff(plain[-1].intervals).max()
+
+
+def test_probed_half_widths_follow_the_hessian():
+    w_E, rng = np.array([0.3, 0.4, 0.3]), np.random.default_rng(0)
+    problem, tolerance = LQR(3), 1e-4
+    expert = problem.expert(w_E, rng)
+    run = list(cpirl(problem.forward, expert, rng=rng, probe=tolerance))
+    U = plane_basis(3)
+    C = U @ np.linalg.inv(reduced(problem.forward(w_E).sensitivity)) @ U.T
+    predicted = np.sqrt(2 * tolerance * abs(w_E @ expert.mu) * np.diag(C))
+    half = np.diff(run[-1].intervals, axis=1).ravel() / 2
+    assert np.all(half >= 0.95 * predicted), "the tolerance set itself is never cut"
+    assert np.all(half <= 2.0 * predicted), "cuts are tangent planes: a box of the ellipsoid"
+
+
+def test_missing_sensitivities_reuse_the_last_good_one_and_free_policies_cut():
+    w_E, rng = hidden(4, 4)
+    problem = LQR(4)
+    expert = problem.expert(w_E, rng)
+    extra = np.array([problem.forward(w).mu for w in rng.dirichlet(np.ones(4), 30)])
+    calls = []
+
+    def forward(w):
+        calls.append(w)
+        response = problem.forward(w)
+        is_good = len(calls) % 2 == 1
+        return replace(
+            response, sensitivity=response.sensitivity if is_good else None, evaluated=extra
+        )
+
+    run = list(cpirl(forward, expert, rng=rng, max_solves=15))
+    assert run[-1].status in (Status.MATCHED, Status.CONVERGED)
+    assert np.abs(run[-1].estimate - w_E).max() <= 1e-3
+    assert len(run[1].polyhedron.cuts) > 10
+    assert all(i.polyhedron.contains(w_E) for i in run)
 
 
 def test_two_policy_counterexample_ends_with_a_dominating_mixture():

@@ -7,6 +7,7 @@ analytic centre; cvxpy (imported only then) is the fallback.
 
 from __future__ import annotations
 
+import warnings
 from typing import NamedTuple
 
 import numpy as np
@@ -127,7 +128,7 @@ def _interior_point(A: Array, max_iter: int = 100) -> Ellipsoid:
             return Ellipsoid(x, np.asarray(square, dtype=np.float64))
         y2h, YA = 2.0 * y * h, y[:, None] * A
         YQ = y[:, None] * Q
-        G = YQ * YQ.T + np.diag(np.maximum(1e-12, y2h * z))
+        G = YQ * YQ.T + np.diag(np.maximum(1e-60, y2h * z))
         T = np.linalg.solve(G, (h + z)[:, None] * YA)
         M = (y2h[:, None] * T - YA).T
         r3y = r3 / y
@@ -158,7 +159,9 @@ def cvxpy_ellipsoid(rows: Array) -> Ellipsoid:
         inside = cvxpy.norm(rows @ B, 2, axis=1) + rows @ c <= 1.0
         problem = cvxpy.Problem(cvxpy.Maximize(cvxpy.log_det(B)), [inside])
         try:
-            problem.solve(solver=solver)
+            with warnings.catch_warnings():  # the caller checks that the result is inscribed
+                warnings.simplefilter("ignore")
+                problem.solve(solver=solver)
         except cvxpy.SolverError:
             continue
         if problem.status == cvxpy.OPTIMAL and B.value is not None:
