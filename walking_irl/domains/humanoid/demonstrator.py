@@ -23,7 +23,10 @@ CONTINUE = (stage(1e3, 60, 1e-5), stage(SEARCH_PENALTY, 100, 1e-6))
 DIRECTLY = (stage(SEARCH_PENALTY, 100, 1e-6),)
 RAISE = (stage(1e5, 60, 1e-5), stage(1e6, 150, 1e-6))
 FINISH = (stage(1e6, 100, 1e-8), stage(1e6, 120, 1e-11))
+APPROACH = (stage(SEARCH_PENALTY, 60, 1e-6), *RAISE)
 HOP = np.deg2rad(1.0)
+FINISH_SHAKES = ((0.0, NUDGE), *np.deg2rad([[0.1, 0.3], [0.3, 1.0], [0.1, 0.3]]).tolist())
+"""Amplitudes of the starts of the last solves, by round [rad]; the first is the learner's."""
 SAME_BASIN, RIVAL_BASIN = 2e-5, 5e-3
 """Relative cost differences below which gaits are the same, and above which a basin is lost."""
 SMOOTH = 1e-8
@@ -70,6 +73,9 @@ class _Search:
     def cost(self, s: Solution) -> float:
         return float(s.folded @ self.w)
 
+    def decrement(self, s: Solution) -> float:
+        return self.solver.decrement(self.w, self.solver.linearise(s.x))
+
 
 def best_gait(
     planar: bool,
@@ -99,13 +105,33 @@ def best_gait(
     hops = [(job.solver.shake(found[0].x, HOP, r), DIRECTLY) for r in rng.spawn(2)]
     found = sorted(found + job.run(hops), key=job.search_cost)
     raised = job.run([(s.x, RAISE) for s in _basins(found, job)])
-    best = min(raised, key=job.cost)
-    finals = job.run([(x, FINISH) for x in _final_starts(job, best.x)])
-    best = min([best, *finals], key=job.cost)
-    smooth = [s for s in finals if _decrement(job, s) < SMOOTH]
-    smooth = [s for s in smooth if job.cost(s) < job.cost(best) * (1 + SAME_BASIN)]
-    chosen = min(smooth, key=job.cost) if smooth else best
-    return OptimalGait(chosen.x, chosen.folded, _decrement(job, chosen), job.starts, job.iterations)
+    chosen = _finish(job, min(raised, key=job.cost), rng)
+    return OptimalGait(chosen.x, chosen.folded, job.decrement(chosen), job.starts, job.iterations)
+
+
+def _finish(job: _Search, best: Solution, rng: np.random.Generator) -> Solution:
+    """Solve tightly, from starts ever farther away, until the best gait is a smooth minimum.
+
+    A smooth gait is preferred to a cheaper one on a contact jump if it costs the same otherwise.
+    """
+    found = [best]
+    for amplitudes in FINISH_SHAKES:
+        best = min(found, key=job.cost)
+        starts = [
+            job.solver.shake(best.x, a, r) for a, r in zip(amplitudes, rng.spawn(2), strict=True)
+        ]
+        found += job.run(
+            [
+                (x, APPROACH + FINISH if a > NUDGE else FINISH)
+                for a, x in zip(amplitudes, starts, strict=True)
+            ]
+        )
+        best = min(found, key=job.cost)
+        near = [s for s in found[1:] if job.cost(s) < job.cost(best) * (1 + SAME_BASIN)]
+        smooth = [s for s in near if job.decrement(s) < SMOOTH]
+        if smooth:
+            return min(smooth, key=job.cost)
+    return best
 
 
 def _basins(found: Sequence[Solution], job: _Search) -> list[Solution]:
@@ -113,11 +139,3 @@ def _basins(found: Sequence[Solution], job: _Search) -> list[Solution]:
     best = job.search_cost(found[0])
     rivals = [s for s in found[1:] if 1 + SAME_BASIN < job.search_cost(s) / best < 1 + RIVAL_BASIN]
     return [found[0], *rivals[:1]]
-
-
-def _final_starts(job: _Search, x: Array) -> list[Array]:
-    return [x, job.solver.shake(x, NUDGE, np.random.default_rng(0))]
-
-
-def _decrement(job: _Search, s: Solution) -> float:
-    return job.solver.decrement(job.w, job.solver.linearise(s.x))

@@ -30,7 +30,10 @@ def save_gait(path: Path, gait: Gait, walker: Walker) -> None:
         InvalidInputError: If the file's ending is not .npz or .csv, or it cannot be written.
     """
     q = whole_cycle(gait, walker.mirror)
-    columns = {"time": np.arange(len(q)) * gait.timestep, **dict(zip(walker.joints, q.T, strict=True))}
+    columns = {
+        "time": np.arange(len(q)) * gait.timestep,
+        **dict(zip(walker.joints, q.T, strict=True)),
+    }
     _check_ending(path)
     try:
         if path.suffix == ".npz":
@@ -39,7 +42,9 @@ def save_gait(path: Path, gait: Gait, walker: Walker) -> None:
             with path.open("w", newline="") as file:
                 writer = csv.writer(file)
                 writer.writerow(columns)
-                writer.writerows(zip(*(map(repr, c.tolist()) for c in columns.values()), strict=True))
+                writer.writerows(
+                    zip(*(map(repr, c.tolist()) for c in columns.values()), strict=True)
+                )
     except OSError as error:
         raise InvalidInputError(f"cannot write {path}: {error.strerror or error}") from error
 
@@ -59,7 +64,9 @@ def load_gait(path: Path, walker: Walker) -> Gait:
     if missing or unknown:
         parts = [f"misses {', '.join(missing)}"] if missing else []
         parts += [f"has unknown columns {', '.join(unknown)}"] if unknown else []
-        raise InvalidInputError(f"{path} {' and '.join(parts)}; {walker.name} needs time and joints")
+        raise InvalidInputError(
+            f"{path} {' and '.join(parts)}; {walker.name} needs time and joints"
+        )
     if len({len(c) for c in columns.values()}) != 1 or len(columns["time"]) < 8:
         raise InvalidInputError(f"{path} needs columns of one length of at least 8 rows")
     table = np.column_stack([columns[c] for c in expected])
@@ -89,7 +96,9 @@ def _symmetric(q: Array, period: float, walker: Walker) -> Gait:
 def _resample(q: Array, n: int, stride: float | None = None) -> Array:
     """Periodic cubic splines through the samples, at ``n`` equal steps."""
     m = len(q)
-    stride = stride if stride is not None else 2 * float(np.mean(q[m // 2 :, 0] - q[: m - m // 2, 0]))
+    stride = (
+        stride if stride is not None else 2 * float(np.mean(q[m // 2 :, 0] - q[: m - m // 2, 0]))
+    )
     drift = np.zeros(q.shape[1])
     drift[0] = stride
     phase = np.arange(m + 1) / m

@@ -125,6 +125,10 @@ class Imitator:
         self.demonstrated = solver.problem.evaluate(self.start).folded()
         self.archive: list[tuple[Array, Array]] = []
 
+    def __getstate__(self) -> dict[str, Any]:
+        """One thread in another process: a pool already uses the cores."""
+        return {**self.__dict__, "threads": 1}
+
     def __call__(self, w: Array) -> Response:
         """Best gait for weights ``w`` near the demonstration."""
         solver = solver_for(self.planar, self.threads)

@@ -54,7 +54,7 @@ def stage(raw_penalty: float, max_iter: int, tol: float, tether: float = 0.0) ->
     return Stage(ROOT_PENALTY * raw_penalty / 1e6, max_iter, tol, tether)
 
 
-DIRECT = (stage(1e6, 150, 1e-6),)
+DIRECT = (stage(1e6, 150, 1e-7),)
 """From a gait of similar weights."""
 LADDER = (stage(1e4, 100, 1e-5), stage(1e5, 60, 1e-5), stage(1e6, 150, 1e-6))
 """From a gait of other weights."""
