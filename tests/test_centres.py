@@ -50,6 +50,17 @@ def test_centre_is_inside_or_its_absence_is_named(seed, name, n, width, stretch)
     check_degenerate(seed, name, n, width, stretch)
 
 
+@settings(max_examples=60, **relaxed)
+@given(
+    seed=st.integers(0, 2**31),
+    n=st.integers(1, 6),
+    width=st.sampled_from([1.0, 1e-3, 1e-6, 1e-8]),
+    stretch=st.sampled_from([1.0, 1e3, 1e6]),
+)
+def test_centre_of_gravity_is_inside_or_its_absence_is_named(seed, n, width, stretch):
+    check_degenerate(seed, "cg", n, width, stretch)
+
+
 @pytest.mark.slow
 @settings(max_examples=10_000, **relaxed)
 @cases
