@@ -47,6 +47,8 @@ def _shadow(panel: Panel, n_panels: int) -> rrb.View:
     position, target = (2.45, 1.6, 0.62), (0.3, 0.3, -0.03)
     if panel.is_flat:
         position, target = (0.92, 0.43, 1.85), (0.92, 0.43, 0.0)
+    elif n_panels == 1:  # the regular tetrahedron
+        position, target = (2.25, 1.55, 0.6), (0.42, 0.42, 0.12)
     elif n_panels > 2:  # narrow views
         position = (3.0, 2.0, 0.75)
     up = (0.0, 1.0, 0.0) if panel.is_flat else (0.0, 0.0, 1.0)

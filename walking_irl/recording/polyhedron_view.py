@@ -46,7 +46,7 @@ def magnification(extent: float) -> float:
     """Largest round factor that keeps ``extent`` within the lens, at least 1.
 
     >>> magnification(0.03), magnification(3.0), magnification(1e-5)
-    (10.0, 1.0, 20000.0)
+    (10.0, 1.0, 30000.0)
     """
     largest = LENS_RADIUS / max(extent, 1e-9)
     if largest <= 1.0:
