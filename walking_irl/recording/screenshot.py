@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
 import socket
 import subprocess
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import rerun_cli
@@ -58,9 +61,15 @@ def save_screenshot(
     """
     file, target = check_recording(path), check_writable(png)
     try:
-        with ViewerClient.spawn(
-            headless=True, port=_free_port(), executable_path=_viewer(), hide_welcome_screen=True
-        ) as viewer:
+        with (
+            _quiet(),
+            ViewerClient.spawn(
+                headless=True,
+                port=_free_port(),
+                executable_path=_viewer(),
+                hide_welcome_screen=True,
+            ) as viewer,
+        ):
             viewer.open([str(file.resolve())])
             _show(viewer, frame)
             time.sleep(settle)
@@ -88,6 +97,18 @@ def _show(viewer: ViewerClient, frame: int | None) -> None:
         ends = [t.end for t in state.recordings[0].timelines if t.name == "frame"]
         frame = int(ends[0]) if ends and ends[0] is not None else 0
     viewer.set_time("frame", sequence=frame, play_state="paused")
+
+
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep the viewer's own log off the terminal; what goes wrong is reported as an error."""
+    before = os.environ.get("RUST_LOG")
+    os.environ["RUST_LOG"] = before or "off"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ["RUST_LOG"]
 
 
 def _viewer() -> str:
