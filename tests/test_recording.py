@@ -18,7 +18,7 @@ from walking_irl.domains.humanoid.gait import Gait, cycle_motion
 from walking_irl.errors import InvalidInputError, RecordingError
 from walking_irl.paths import model_path
 from walking_irl.polyhedron import WeightPolyhedron
-from walking_irl.recording import Experiment, Recorder, check_writable
+from walking_irl.recording import Experiment, Recorder, check_writable, record_motion
 from walking_irl.recording.body_geometry import log_body, visible_geoms
 from walking_irl.recording.gait_view import WalkerView
 from walking_irl.recording.hulls import faces_lost, hull
@@ -297,6 +297,19 @@ def test_run_that_fails_before_its_first_iteration_is_still_readable(tmp_path: P
         raise ZeroDivisionError
     found = inspect_recording(tmp_path / "x.rrd")
     assert (found["iterations"], found["w"], found["ending"]) == (0, None, "ZeroDivisionError")
+
+
+def test_one_motion_alone_is_recorded(tmp_path: Path, model: mujoco.MjModel) -> None:
+    path = record_motion(
+        tmp_path / "a.rrd", WalkerView(model), walk(), title="A walk", text="At 1.25 m/s."
+    )
+    recording = Recording(path)
+    frames = recording.column("/world/walker/leg", "Transform3D:translation").times
+    assert len(frames) == round(8 * CYCLE * PLAYBACK_RATE)
+    assert not any(e.startswith("/world/expert") for e in recording.entities)
+    assert recording.summary == "# A walk\n\nAt 1.25 m/s."
+    found = inspect_recording(path)
+    assert (found["iterations"], found["w"]) == (None, None)
 
 
 def test_unwritable_targets_are_found_before_the_run(tmp_path: Path) -> None:

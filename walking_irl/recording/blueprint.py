@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import rerun.blueprint as rrb
 
 from walking_irl.recording import style
 from walking_irl.recording.experiment import Experiment
 from walking_irl.recording.panels import Panel, panels
-from walking_irl.recording.progress_view import BARS, FIGURES, ROW, weight_path
+from walking_irl.recording.progress_view import BARS, FIGURES, ROW, feature_path, weight_path
+from walking_irl.recording.world import WorldView
 
 
-def blueprint(experiment: Experiment, world: rrb.View | None) -> rrb.Blueprint:
+def blueprint(experiment: Experiment, world: WorldView[Any] | None) -> rrb.Blueprint:
     """World left, polyhedron right; below intervals, certificate and a short text."""
     shown = panels(experiment.names)
     shadows = [_shadow(panel, len(shown)) for panel in shown]
-    top: list[rrb.View | rrb.Container] = [] if world is None else [world]
+    top: list[rrb.View | rrb.Container] = [] if world is None else [world.view()]
     if shadows:
         top.append(rrb.Horizontal(*shadows, name="Weights that explain the expert"))
     shares = [[1.0], [1.0, max(0.7, 0.5 * len(shadows))]][len(top) - 1] if top else []
@@ -24,15 +27,26 @@ def blueprint(experiment: Experiment, world: rrb.View | None) -> rrb.Blueprint:
         rrb.Tabs(
             rrb.TextDocumentView(origin="/summary", name="What to look at"),
             rrb.TextLogView(origin="/log", name="Log"),
-            _plots("/features", "Features"),
-            _plots("/joints", "Joints"),
+            _plots("Features", [f"/{feature_path(name)}" for name in experiment.names]),
+            *([] if world is None else [_plots("Joints [deg]", world.curves())]),
             active_tab=0,
         ),
         column_shares=[1.15, 1.0, 1.0],
     )
     rows = [rrb.Horizontal(*top, column_shares=shares), bottom] if top else [bottom]
+    return _window(rrb.Vertical(*rows, row_shares=[1.75, 1.0][: len(rows)]))
+
+
+def motion_blueprint(world: WorldView[Any]) -> rrb.Blueprint:
+    """One motion alone: the world, and beside it the text and the joints."""
+    text = rrb.TextDocumentView(origin="/summary", name="Summary")
+    side = rrb.Vertical(text, _plots("Joints [deg]", world.curves()), row_shares=[1.0, 1.0])
+    return _window(rrb.Horizontal(world.view(), side, column_shares=[1.7, 1.0]))
+
+
+def _window(content: rrb.Container) -> rrb.Blueprint:
     return rrb.Blueprint(
-        rrb.Vertical(*rows, row_shares=[1.75, 1.0][: len(rows)]),
+        content,
         rrb.TimePanel(
             timeline="frame", state="collapsed", fps=style.PLAYBACK_RATE, play_state="playing"
         ),
@@ -94,7 +108,11 @@ def _certificate() -> rrb.View:
     )
 
 
-def _plots(origin: str, name: str) -> rrb.View:
+def _plots(name: str, curves: list[str]) -> rrb.View:
     return rrb.TimeSeriesView(
-        origin=origin, name=name, background=rrb.archetypes.PlotBackground(color=style.PAPER)
+        origin="/",
+        contents=curves,
+        name=name,
+        background=rrb.archetypes.PlotBackground(color=style.PAPER, show_grid=False),
+        plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
     )

@@ -17,6 +17,7 @@ from walking_irl.types import Array, Rollout
 
 FORCE_SCALE = 1.0e-3  # [m/N]
 GHOST = style.with_alpha(style.GHOST, 0.62)
+MAIN_JOINTS = ("hip_flexion_r", "knee_r", "ankle_r")
 BESIDE = 0.9
 """How far to the learner's left the ghost walks [m]."""
 TRAIL_FRAMES = 80
@@ -58,9 +59,10 @@ class WalkerView:
         trail = rr.Points3D.from_fields(colors=[style.TRAIL], radii=[0.009])
         stream.log("world/com_trail", trail, static=True)
         for _, name in self._hinges():
-            names = ["learner", "expert"] if self.expert is not None else ["learner"]
-            colours = [style.LEARNER, style.EXPERT][: len(names)]
-            lines = rr.SeriesLines(names=[f"{name} {n} [deg]" for n in names], colors=colours)
+            lines = rr.SeriesLines(names=[name])  # alone, each joint has its own colour
+            if self.expert is not None:
+                names = [f"{name} learner", f"{name} expert"]
+                lines = rr.SeriesLines(names=names, colors=[style.LEARNER, style.EXPERT])
             stream.log(_joint_path(name), lines, static=True)
 
     def log_iteration(
@@ -98,7 +100,9 @@ class WalkerView:
         return rrb.Spatial3DView(
             origin="/world/follow",
             contents=["/world/**"],
-            name="Walking: learner, and the expert as a red ghost",
+            name="Walking"
+            if self.expert is None
+            else "Walking: learner, and the expert as a red ghost",
             background=style.PAPER,
             line_grid=rrb.LineGrid3D(
                 visible=True,
@@ -111,6 +115,13 @@ class WalkerView:
             ),
             overrides={"/world/com_trail": [rrb.VisibleTimeRanges([since])]},
         )
+
+    def curves(self) -> list[str]:
+        """The joints of the right leg that move most, or all joints of a body without them."""
+        names = [name for _, name in self._hinges()]
+        return [
+            f"/{_joint_path(n)}" for n in names if n in MAIN_JOINTS or not {*MAIN_JOINTS} & {*names}
+        ]
 
     def describe(self) -> str:
         """One sentence for the summary."""

@@ -29,6 +29,10 @@ class WorldView(Protocol[Motion_contra]):
         """The view of this world in the blueprint."""
         ...
 
+    def curves(self) -> list[str]:
+        """Entities of the few curves that are plotted from the start."""
+        ...
+
     def describe(self) -> str:
         """One sentence for the summary: what the view shows."""
         ...

@@ -9,7 +9,7 @@ from typing import Generic, Self, TypeVar
 import rerun as rr
 
 from walking_irl.errors import RecordingError
-from walking_irl.recording.blueprint import blueprint
+from walking_irl.recording.blueprint import blueprint, motion_blueprint
 from walking_irl.recording.experiment import Clock, Experiment
 from walking_irl.recording.files import check_writable, write_atomically
 from walking_irl.recording.polyhedron_view import PolyhedronView
@@ -24,6 +24,23 @@ FLUSH_SECONDS = 60.0
 FRAMES_WITHOUT_WORLD = round(1.5 * PLAYBACK_RATE)
 
 Motion = TypeVar("Motion")
+
+
+def open_stream() -> tuple[rr.RecordingStream, rr.MemoryRecording]:
+    """A stream whose content stays in memory and does not depend on the clock.
+
+    Raises:
+        RecordingError: If Rerun is disabled.
+    """
+    stream = rr.RecordingStream(
+        APPLICATION_ID, send_properties=False, batcher_config=rr.ChunkBatcherConfig.NEVER()
+    )
+    if not stream.is_enabled():
+        raise RecordingError(
+            "cannot record: Rerun is disabled by the environment variable RERUN; unset it"
+        )
+    stream.set_log_time_enabled(False)
+    return stream, stream.memory_recording()
 
 
 class Recorder(Generic[Motion]):
@@ -56,19 +73,8 @@ class Recorder(Generic[Motion]):
         self._n_frames = 0
 
     def __enter__(self) -> Self:
-        self._stream = rr.RecordingStream(
-            APPLICATION_ID,
-            send_properties=False,
-            batcher_config=rr.ChunkBatcherConfig.NEVER(),
-        )
-        if not self._stream.is_enabled():
-            raise RecordingError(
-                "cannot record: Rerun is disabled by the environment variable RERUN; unset it"
-            )
-        self._stream.set_log_time_enabled(False)
-        self._memory = self._stream.memory_recording()
-        view = None if self.world is None else self.world.view()
-        self._stream.send_blueprint(blueprint(self.experiment, view))
+        self._stream, self._memory = open_stream()
+        self._stream.send_blueprint(blueprint(self.experiment, self.world))
         self._stream.send_recording_name(_title(self.experiment))
         if self.world is not None:
             self.world.log_static(self._stream)
@@ -119,6 +125,34 @@ class Recorder(Generic[Motion]):
         values = properties(self.experiment, self._last, self._n_iterations, ending)
         self._stream.send_property("experiment", rr.AnyValues(**values))
         write_atomically(self.path, self._memory.drain_as_bytes())
+
+
+def record_motion(
+    path: str | Path, world: WorldView[Motion], motion: Motion, *, title: str, text: str = ""
+) -> Path:
+    """Record one motion alone, without any inverse problem.
+
+    Args:
+        path: The ``.rrd`` file.
+        world: Shows the motion.
+        motion: What to show, for as long as the last motion of a run.
+        title: Name of the recording.
+        text: Markdown below the title.
+
+    Raises:
+        RecordingError: If ``path`` cannot be written, or Rerun is disabled.
+    """
+    target = check_writable(path)
+    stream, memory = open_stream()
+    stream.send_blueprint(motion_blueprint(world))
+    stream.send_recording_name(title)
+    world.log_static(stream)
+    world.log_iteration(stream, Clock(0, 0), motion, True)
+    markdown = rr.TextDocument(f"# {title}\n\n{text}", media_type=rr.MediaType.MARKDOWN)
+    stream.log("summary", markdown, static=True)
+    stream.flush(timeout_sec=FLUSH_SECONDS)
+    write_atomically(target, memory.drain_as_bytes())
+    return target
 
 
 def _title(experiment: Experiment) -> str:
