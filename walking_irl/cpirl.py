@@ -160,9 +160,9 @@ def _iteration(
 
 
 def _intervals(guide: Guide, decision: Decision, probe: float | None) -> Array:
-    """Cut-based bounds; for an estimated expert near the end t standard errors + a floor."""
+    """Cut-based bounds; for an estimated expert at the end t standard errors + a floor."""
     archive = guide.archive
-    if guide.is_exact or guide.model is None:
+    if guide.is_exact or guide.model is None or decision.status is Status.CUT:
         lift = guide.lift()
         if probe is not None:
             lift = np.maximum(lift, probe * np.abs(archive.mu))

@@ -25,6 +25,10 @@ SLACK = 2e-4
 """By how much, relative to |w.mu_E|, a Newton query may miss a cut."""
 FLOOR = 2e-5
 """Relative regret below which poor Newton steps mean the demonstration's own gap is reached."""
+BIAS_MARGIN = 1.25
+"""Share of the best regret that a noisy expert's bias may explain."""
+CLEARLY_WORSE = 2e-4
+"""Relative rise of the regret that noise does not explain."""
 LONGEST_STEP = 0.3
 """Longest Newton step (L1) where min f is not known to be 0."""
 MEASURE_WITHIN, MEASURE_AGAIN, MOST_MEASUREMENTS = 0.1, 0.01, 2
@@ -81,13 +85,17 @@ class Guide:
         self._steps: list[float] = []
 
     def lift(self) -> Array:
-        """Level of the cuts: 0 ('optimal'), sigma ('set') or the best regret ('minimise')."""
+        """Level of the cuts: 0 ('optimal'), sigma ('set') or the best regret ('minimise').
+
+        The best regret also where noise may have made the expert look worse than it is.
+        """
         archive = self.archive
         if self.mode == "set":
             return self.tolerances.regret * np.abs(archive.mu)
-        if self.mode == "minimise" and archive.responses:
+        if (self.mode == "minimise" or not self.is_exact) and archive.responses:
             f = archive.values(archive.W) - archive.W @ (archive.mu + archive.error)
-            return np.full(archive.K, max(float(f.min()), 0.0))
+            margin = 1.0 if self.mode == "minimise" else BIAS_MARGIN
+            return np.full(archive.K, margin * max(float(f.min()), 0.0))
         return np.zeros(archive.K)
 
     def polyhedron(self) -> WeightPolyhedron:
@@ -202,7 +210,7 @@ class Guide:
         """Newton query, or the end; None where a centre must be tried instead."""
         assert self.model is not None
         if not self.is_exact:
-            return self._newton_estimated()
+            return self._newton_estimated(rule)
         archive, tol = self.archive, self.tolerances
         f = self._relative_regrets()
         is_poor = rule is Rule.NEWTON and float(f[-1]) > 0.9 * self._best_before
@@ -232,7 +240,7 @@ class Guide:
         length = float(np.abs(move).sum())
         return w + move * min(1.0, LONGEST_STEP / max(length, 1e-300))
 
-    def _newton_estimated(self) -> Decision:
+    def _newton_estimated(self, rule: Rule) -> Decision | None:
         """As :meth:`_newton` where mu_E is a sample mean: f may pass below 0, cuts say less."""
         archive = self.archive
         is_new = self._measure_defect()
@@ -250,7 +258,16 @@ class Guide:
         )
         if is_measured and (length <= max(self.tolerances.step, noise) or has_stalled):
             return Decision(None, Rule.NEWTON, step.w, Status.CONVERGED)
-        v = w + (step.w - w) * min(1.0, LONGEST_STEP / max(length, 1e-300))
+        f = self._relative_regrets()
+        is_poor = rule is Rule.NEWTON and float(f[-1] - f[:-1].min()) > CLEARLY_WORSE
+        self._n_poor = self._n_poor + 1 if is_poor else 0
+        if self._n_poor >= 2:
+            self._n_poor = 0
+            return None
+        share = min(1.0, LONGEST_STEP / max(length, 1e-300)) * 0.5**self._n_poor
+        v = w + (step.w - w) * share
+        if np.abs(self.archive.W - v).sum(axis=1).min() <= 1e-9:  # asked before: learn elsewhere
+            return None
         return Decision(v, Rule.NEWTON, step.w, Status.CUT)
 
     def _measure_defect(self) -> bool:

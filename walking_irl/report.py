@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from walking_irl.errors import InvalidInputError
-from walking_irl.types import Array, Iteration, Objective, Status
+from walking_irl.types import Array, Iteration, Objective, Rule, Status
 
 SUCCESS = (
     Status.MATCHED,
@@ -95,9 +95,8 @@ class Report:
 
     @property
     def ending(self) -> Status:
-        """The status that ended the search, probes left aside."""
-        decisive = [it.status for it in self.iterations if it.status is not Status.PROBE]
-        return decisive[-1]
+        """Why CPIRL yielded its last iteration."""
+        return self.last.status
 
     @property
     def is_success(self) -> bool:
@@ -150,8 +149,8 @@ class Report:
             "relative_loss": self.relative_loss(self.recovered_mu),
             "regret": last.best_regret,
             "certificate": last.certificate,
-            "forward_solves": sum(it.status is not Status.PROBE for it in self.iterations),
-            "probe_solves": sum(it.status is Status.PROBE for it in self.iterations),
+            "forward_solves": sum(it.rule is not Rule.PROBE for it in self.iterations),
+            "probe_solves": sum(it.rule is Rule.PROBE for it in self.iterations),
             "solves_to_1pct": self.solves_to_1pct,
             "status": self.status,
             "seconds": self.seconds,

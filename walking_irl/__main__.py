@@ -1,0 +1,8 @@
+"""``python -m walking_irl``: the command line."""
+
+import sys
+
+from walking_irl.cli import main
+
+if __name__ == "__main__":
+    sys.exit(main())

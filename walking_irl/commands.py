@@ -1,0 +1,261 @@
+"""What the commands do; each takes parsed arguments and a console, and returns an exit code."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from walking_irl.domains import DOMAINS, load
+from walking_irl.errors import InvalidInputError
+from walking_irl.report import Report, check_folder, write_json
+from walking_irl.session import Case, Setup, run, workers
+from walking_irl.types import Array, Iteration, Rollout, Rule
+
+INTERRUPTED = 130
+
+
+def parse_weights(text: str) -> tuple[float, ...]:
+    """Weights from the command line.
+
+    >>> parse_weights("1,2.5")
+    (1.0, 2.5)
+    """
+    try:
+        return tuple(float(part) for part in text.split(","))
+    except ValueError as error:
+        raise InvalidInputError(
+            f"weights must be numbers separated by commas, got {text!r}"
+        ) from error
+
+
+def recover(args: argparse.Namespace, console: Console) -> int:
+    """``walking-irl recover``."""
+    record = None if args.no_record else args.record
+    setup = Setup(
+        domain=args.domain,
+        centre=args.centre,
+        mode=args.mode,
+        seed=args.seed,
+        weights=parse_weights(args.weights) if args.weights else None,
+        population=args.population,
+        rollouts=args.rollouts,
+        noise=args.noise,
+        disturbance=args.disturbance,
+        demonstration=args.demonstration,
+        max_solves=args.max_solves,
+        record=record,
+    )
+    check_folder([record, args.json])
+    load(setup.domain)
+    walks = None if record is None else record.with_suffix(".npz")
+
+    def on_expert(case: Case) -> None:
+        if walks is not None and case.trajectories:
+            save_walks(walks, case.trajectories, case.domain.walker.joints)
+        if not args.quiet:
+            known = f"{len(case.trajectories)} recorded walks" if case.trajectories else "itself"
+            console.print(f"expert ready, known by {known}; the learner starts")
+
+    def on_iteration(it: Iteration, report: Report) -> None:
+        if not args.quiet:
+            console.print(progress_line(it, report))
+
+    if not args.quiet:
+        console.print(f"{setup.domain}: solving for the expert ...")
+    with workers() as executor:
+        report = run(setup, executor=executor, on_expert=on_expert, on_iteration=on_iteration)
+    if args.json is not None:
+        write_json(args.json, report.to_json())
+    show_report(report, console, walks if walks is not None and walks.exists() else None)
+    if report.was_interrupted:
+        return INTERRUPTED
+    return 0 if report.is_success else 1
+
+
+def progress_line(it: Iteration, report: Report) -> str:
+    """One line on an iteration."""
+    width = float(np.diff(it.intervals).max())
+    solver = it.response.info.get("iterations")
+    detail = f", {solver} solver iterations" if solver else ""
+    rule = {Rule.CENTRE: "centre", Rule.NEWTON: "newton", Rule.PROBE: "probe "}[it.rule]
+    scale = abs(float(it.w @ report.expert_mu))
+    return (
+        f"  {it.k + 1:3d} {rule}  regret {100 * it.regret / scale:9.5f} %  "
+        f"certificate {it.certificate:.1e}  widest interval {width:.4f}{detail}"
+    )
+
+
+def show_report(report: Report, console: Console, walks: Path | None) -> None:
+    """Print the table of weights and the figures below it."""
+    table = Table(
+        title=f"What the {report.domain} walks for" if "humanoid" in report.domain else None
+    )
+    table.add_column("objective")
+    hidden = report.w_expert
+    if hidden is not None:
+        table.add_column("hidden", justify="right")
+    table.add_column("recovered", justify="right")
+    table.add_column("interval", justify="right")
+    for j, objective in enumerate(report.objectives):
+        low, high = report.last.intervals[j]
+        cells = [objective.name, *([] if hidden is None else [f"{hidden[j]:.4f}"])]
+        table.add_row(*cells, f"{report.w[j]:.4f}", f"{low:.4f} .. {high:.4f}")
+    console.print(table)
+    out = report.to_json()
+    console.print(f"ended: {report.status}")
+    console.print(f"certificate {report.last.certificate:.2e} (return that some mixture may lose)")
+    if report.l1_error is not None:
+        inside = "inside" if report.contains_expert else "NOT inside"
+        console.print(f"L1 error {report.l1_error:.5f}; hidden weights {inside} the intervals")
+    loss = report.relative_loss(report.recovered_mu)
+    if loss is not None:
+        console.print(f"loss of the recovered policy under the hidden weights {100 * loss:.5f} %")
+    seconds = ", ".join(f"{k} {v:.1f}" for k, v in report.seconds.items())
+    console.print(f"{out['forward_solves']} forward solves + {out['probe_solves']} probes")
+    console.print(f"seconds: {seconds}")
+    if report.recording is not None:
+        console.print(f"recording {escape(report.recording)}: walking-irl view {report.recording}")
+    if walks is not None:
+        console.print(f"the expert's walks: {escape(str(walks))}")
+
+
+def save_walks(path: Path, walks: tuple[Rollout, ...], joints: tuple[str, ...]) -> None:
+    """Write trajectories: time (n, T), q, v (n, T, nv), u (n, T, nu), joint names."""
+    arrays = {key: np.array([getattr(w, key) for w in walks]) for key in ("time", "q", "v", "u")}
+    try:
+        np.savez_compressed(path, joints=np.array(joints), **arrays)
+    except OSError as error:
+        path.unlink(missing_ok=True)
+        raise InvalidInputError(f"cannot write {path}: {error.strerror or error}") from error
+
+
+def gait(args: argparse.Namespace, console: Console) -> int:
+    """``walking-irl gait``."""
+    from walking_irl.domains.humanoid.domain import Humanoid
+    from walking_irl.domains.humanoid.files import save_gait
+    from walking_irl.domains.humanoid.forward import check_weights
+    from walking_irl.domains.humanoid.realism import figures
+
+    check_folder([args.save, args.record, args.png, args.json])
+    domain = load(args.domain)
+    if not isinstance(domain, Humanoid):
+        raise InvalidInputError(f"gait needs humanoid or humanoid-planar, got {args.domain!r}")
+    given = parse_weights(args.weights)
+    w = check_weights(np.array(given))
+    if not args.quiet:
+        console.print("weights normalised to sum 1: " + ", ".join(f"{v:.4f}" for v in w))
+    with workers() as executor:
+        response = domain.forward(w, executor)
+    found = response.policy
+    content = {
+        "objectives": [o.name for o in domain.objectives],
+        "w": w.tolist(),
+        "mu": response.mu.tolist(),
+        **figures(domain.walker, found),
+        "solver": dict(response.info),
+    }
+    if args.save is not None:
+        save_gait(args.save, found, domain.walker)
+    if args.png is not None:
+        from walking_irl.domains.humanoid.render import strip
+
+        strip(domain.walker, found, path=args.png)
+    if args.record is not None:
+        _record_walk(args.record, domain, found, args.seconds, w)
+    if args.json is not None:
+        write_json(args.json, content)
+    if not args.quiet:
+        _show_gait(content, console)
+    return 0
+
+
+def _record_walk(path: Path, domain: Any, found: Any, seconds: float, w: Array) -> None:
+    """Closed-loop walk of a gait at half the knot timestep, as a recording."""
+    from walking_irl.domains.humanoid.policy import tracking_policy
+    from walking_irl.domains.humanoid.rollout import rollout
+    from walking_irl.recording import record_motion
+    from walking_irl.recording.gait_view import WalkerView
+
+    if not seconds > 0:
+        raise InvalidInputError(f"seconds must be positive, got {seconds}")
+    policy = tracking_policy(domain.walker, found, substeps=2)
+    walked = rollout(domain.walker, policy, seconds=seconds)
+    rows = [f"| {o.name} | {v:.4f} |" for o, v in zip(domain.objectives, w, strict=True)]
+    text = "\n".join(["| objective | weight |", "|---|---|", *rows])
+    record_motion(path, WalkerView(domain.walker.model), walked, title=domain.name, text=text)
+
+
+def _show_gait(content: dict[str, Any], console: Console) -> None:
+    table = Table("figure", "value")
+    for name, unit in (
+        ("speed", "m/s"),
+        ("step_length", "m"),
+        ("cadence", "steps/min"),
+        ("stance_fraction", "of the cycle"),
+        ("cost_of_transport", "mechanical"),
+        ("peak_vertical_force", "body weights"),
+        ("max_root_residual", "body weights"),
+        ("realism", "of 1"),
+    ):
+        table.add_row(name.replace("_", " "), f"{content[name]:.4g} {unit}")
+    for name, value in zip(content["objectives"], content["mu"], strict=True):
+        table.add_row(f"mu {name}", f"{value:.5f}")
+    console.print(table)
+
+
+def inspect(args: argparse.Namespace, console: Console) -> int:
+    """``walking-irl inspect``."""
+    from walking_irl.recording.reader import inspect_recording
+
+    check_folder([args.json])
+    content = inspect_recording(args.file)
+    if args.json is not None:
+        write_json(args.json, content)
+    table = Table("objective", "hidden", "recovered", "interval")
+    hidden, found, bounds = content["w_expert"], content["w"], content["intervals"]
+    for j, name in enumerate(content["objectives"] or []):
+        table.add_row(
+            str(name),
+            "unknown" if hidden is None else f"{hidden[j]:.4f}",
+            "-" if found is None else f"{found[j]:.4f}",
+            "-" if bounds is None else f"{bounds[j][0]:.4f} .. {bounds[j][1]:.4f}",
+        )
+    console.print(table)
+    for key in ("domain", "seed", "centre", "mode", "status", "ending", "certificate"):
+        if content[key] is not None:
+            console.print(f"{key}: {escape(str(content[key]))}")
+    console.print(f"iterations: {content['iterations']}, frames: {content['frames']}")
+    console.print(f"timelines: {', '.join(content['timelines'])}")
+    console.print(f"{len(content['entities'])} entities:")
+    for entity in content["entities"]:
+        console.print(f"  {escape(entity)}")
+    return 0
+
+
+def view(args: argparse.Namespace, console: Console) -> int:
+    """``walking-irl view``."""
+    from walking_irl.recording.screenshot import open_viewer, save_screenshot
+
+    if args.png is None:
+        open_viewer(args.file)
+        console.print("the viewer is opening; move the frame slider to play")
+    else:
+        save_screenshot(args.file, args.png, frame=args.frame)
+        console.print(f"wrote {escape(str(args.png))}")
+    return 0
+
+
+def domains(args: argparse.Namespace, console: Console) -> int:
+    """``walking-irl domains``."""
+    table = Table("domain", "world", "objectives", "solved by")
+    for name, entry in DOMAINS.items():
+        objectives = ", ".join(o.name for o in entry.make().objectives)
+        table.add_row(name, entry.world, objectives, entry.solver)
+    console.print(table)
+    return 0

@@ -1,0 +1,88 @@
+"""The humanoid's side of a session: experts, demonstrations from files, what a recording shows."""
+
+from __future__ import annotations
+
+from concurrent.futures import Executor
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from walking_irl.domains.humanoid.domain import Humanoid, exact_expert
+from walking_irl.domains.humanoid.files import load_gait
+from walking_irl.domains.humanoid.forward import check_weights, solver_for
+from walking_irl.domains.humanoid.gait import Gait, cycle_motion
+from walking_irl.domains.humanoid.population import POPULATIONS
+from walking_irl.domains.humanoid.protocol import Protocol
+from walking_irl.errors import InvalidInputError
+from walking_irl.types import Rollout
+
+if TYPE_CHECKING:
+    from walking_irl.session import Case, Setup
+
+THREADS = 2
+"""Threads of one learner's solve: solves follow one another, so the cores would idle."""
+PHYSICAL = 0.05
+"""Largest root force of a demonstration [body weights]: more is not this body's walk."""
+
+
+def humanoid_case(domain: Humanoid, setup: Setup, executor: Executor | None) -> Case:
+    """The expert that a setup asks for."""
+    from walking_irl.session import Case
+
+    protocol = Protocol(setup.rollouts, setup.noise, setup.disturbance)
+    if setup.demonstration is not None:
+        gait = load_gait(setup.demonstration, domain.walker)
+        expert = exact_expert(gait, _folded(domain, gait, setup.demonstration))
+        case = Case(domain, expert, domain.learner(expert, THREADS))
+    else:
+        rng = np.random.default_rng(setup.seed)
+        if setup.population not in POPULATIONS:
+            choices = ", ".join(POPULATIONS)
+            raise InvalidInputError(
+                f"unknown population {setup.population!r}; choose from {choices}"
+            )
+        w_E = POPULATIONS[setup.population](rng)
+        if setup.weights is not None:
+            w_E = check_weights(np.asarray(setup.weights))
+        made = domain.demonstrate(w_E, rng, protocol, executor)
+        gait = made.gait
+        case = Case(
+            domain,
+            made.expert,
+            domain.learner(made.expert, THREADS),
+            measure=domain.remeasure(protocol, setup.seed, executor),
+            w_expert=w_E,
+            true_mu=-made.optimum.folded,
+            trajectories=made.rollouts,
+        )
+    if setup.record is not None:
+        from walking_irl.recording.gait_view import WalkerView
+
+        case.world = WalkerView(domain.walker.model, one_cycle(domain, gait))
+        case.motion = lambda policy: one_cycle(domain, policy)
+    return case
+
+
+def one_cycle(domain: Humanoid, gait: Gait) -> Rollout:
+    """A gait's whole cycle, ready to be shown."""
+    from walking_irl.recording.motion import periodic_rollout
+
+    q, v, a = cycle_motion(gait, domain.walker.mirror)
+    return periodic_rollout(q, v, a, gait.timestep, 2 * gait.step_length)
+
+
+def _folded(domain: Humanoid, gait: Gait, path: Path) -> np.ndarray:
+    """Folded costs of a demonstrated gait.
+
+    Raises:
+        InvalidInputError: If it is not a walk that this body can do.
+    """
+    evaluation = solver_for(domain.planar).problem.evaluate(gait.to_vector())
+    worst = float(np.abs(evaluation.root).max())
+    if not worst < PHYSICAL:
+        raise InvalidInputError(
+            f"{path} is not a walk of this body: its root would need {worst:.2g} body weights of "
+            f"external force (at most {PHYSICAL}); give a gait saved by walking-irl gait --save"
+        )
+    return evaluation.folded()
