@@ -7,6 +7,7 @@ treated as accurately as one of width 1.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,8 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 from walking_irl.errors import SolverError
 from walking_irl.types import Array
 
+LAWRENCE_AGREEMENT = 1e-6
+"""Relative difference of two volumes by Lawrence's formula that rounding explains."""
 FLAT_RADIUS = 1e-7
 """Inscribed radius up to which a set counts as flat: the linear programs' own tolerance."""
 
@@ -184,6 +187,46 @@ def distinct_rows(cuts: Array, is_lazy: NDArray[np.bool_]) -> tuple[Array, NDArr
     np.logical_and.at(lazy, group, is_lazy)
     order = np.argsort(first)
     return cuts[first[order]], lazy[order]
+
+
+def whitened_volume(rows: Array) -> float:
+    r"""Volume of the bounded set {y : rows y <= 1}, shape (m, n).
+
+    By the vertices and the n rows through each (J. Lawrence 1991, Polytope volume computation),
+
+    .. math:: \mathrm{vol} = \frac{1}{n!} \sum_v \frac{(c \cdot v)^n}{|\det A_v| \prod_i \gamma_i},
+        \qquad A_v^T \gamma = c
+
+    for any c: two random ones must agree. Where more than n rows meet in a vertex, or they do not
+    agree, by the convex hull of the vertices, which is exact too but up to 30 times slower.
+    """
+    n = rows.shape[1]
+    if n > 1:
+        try:
+            met = HalfspaceIntersection(np.c_[rows, -np.ones(len(rows))], np.zeros(n)).dual_facets
+        except QhullError:
+            met = []
+        if met and all(len(f) == n for f in met):
+            first, second = (_lawrence(rows[np.array(met)], seed) for seed in (1, 2))
+            if first > 0 and abs(first - second) < LAWRENCE_AGREEMENT * first:
+                return first
+    return hull_volume(whitened_vertices(rows))
+
+
+def _lawrence(corners: Array, seed: int) -> float:
+    """Lawrence's sum over vertices given by their n rows, shape (n_vertices, n, n)."""
+    n = corners.shape[1]
+    c = np.random.default_rng(seed).normal(size=n)
+    det = np.abs(np.linalg.det(corners))
+    corners, det = corners[det > 1e-300], det[det > 1e-300]
+    try:
+        v = np.linalg.solve(corners, np.ones((len(corners), n, 1)))[..., 0]
+        gamma = np.linalg.solve(np.swapaxes(corners, 1, 2), np.tile(c[:, None], (len(v), 1, 1)))
+    except np.linalg.LinAlgError:
+        return -1.0
+    with np.errstate(all="ignore"):
+        terms = (v @ c) ** n / (det * np.prod(gamma[..., 0], axis=1))
+    return float(terms.sum() / math.factorial(n))
 
 
 def hull_volume(vertices: Array) -> float:

@@ -23,11 +23,11 @@ from walking_irl.halfspaces import (
     barrier_centre,
     chebyshev_ball,
     distinct_rows,
-    hull_volume,
     linear_program,
     whitened_facets,
     whitened_rows,
     whitened_vertices,
+    whitened_volume,
 )
 from walking_irl.types import Array
 
@@ -276,9 +276,7 @@ class WeightPolyhedron:
         n = self.n_objectives - 1
         R = self.barrier.R
         if self.n_objectives <= EXACT_OBJECTIVES:
-            return hull_volume(whitened_vertices(self._whitened)) / abs(
-                float(np.prod(R.diagonal()))
-            )
+            return whitened_volume(self._whitened) / abs(float(np.prod(R.diagonal())))
         whole = WeightPolyhedron.simplex(self.n_objectives)
         log_ratio = np.log(np.abs(whole.barrier.R.diagonal() / R.diagonal())).sum()
         return math.sqrt(n + 1.0) / math.factorial(n) * math.exp(log_ratio)

@@ -12,6 +12,7 @@ from itertools import combinations
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from walking_irl.errors import EmptyPolyhedronError
 from walking_irl.recording import style
@@ -230,10 +231,9 @@ def _mesh(
 def _edges_lost(before: Hull, after: Hull) -> Array:
     """Edges of ``before`` that are not edges of ``after``."""
     size = float(np.ptp(before.points, axis=0).max())
-    kept = np.array([np.sort(e, axis=0).ravel() for e in after.edges]).reshape(-1, 6)
-    is_lost = [
-        np.abs(kept - np.sort(e, axis=0).ravel()).max(axis=1).min(initial=np.inf) > 1e-6 * size
-        for e in before.edges
-    ]
-    lost: Array = before.edges[np.array(is_lost, dtype=bool)]
+    before_keys, after_keys = (
+        np.sort(np.asarray(h.edges), axis=1).reshape(-1, 6) / (1e-6 * size) for h in (before, after)
+    )
+    distance, _ = cKDTree(after_keys).query(before_keys, distance_upper_bound=1.0, p=np.inf)
+    lost: Array = before.edges[~np.isfinite(distance)]
     return lost
