@@ -25,6 +25,8 @@ LENS_RADIUS = 0.32
 LENS_CENTRE = np.array([-0.2, -0.2, -0.72])
 """Where the lens stands, relative to the middle of the frame's foot."""
 LABEL_DROP = 1.25 * LENS_RADIUS
+CLEAR_EDGES, MOST_EDGES = 40, 90
+"""Edges from which lines become thinner, and the most that are drawn."""
 STEPS = np.array([1.0, 2.0, 3.0, 5.0, 7.0])
 """Magnifications are these times powers of ten."""
 
@@ -205,8 +207,19 @@ def _log_set(stream: rr.RecordingStream, root: str, body: Hull, see: Lens | None
         stream.log(f"{root}/set", _mesh(points, body.triangles, style.POLYHEDRON, 0.28))
     else:
         stream.log(f"{root}/set", rr.Clear(recursive=False))
-    lines = rr.LineStrips3D(edges, colors=[style.POLYHEDRON_EDGE], radii=rr.Radius.ui_points([1.2]))
+    edges = _longest(edges)
+    width = max(0.5, 1.2 * min(1.0, CLEAR_EDGES / max(len(edges), 1)))
+    lines = rr.LineStrips3D(
+        edges, colors=[style.POLYHEDRON_EDGE], radii=rr.Radius.ui_points([width])
+    )
     stream.log(f"{root}/edges", lines)
+
+
+def _longest(edges: Array) -> Array:
+    """The longest edges: a round set has hundreds, which would hide the points inside."""
+    length = np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
+    chosen: Array = edges[np.sort(np.argsort(-length)[:MOST_EDGES])]
+    return chosen
 
 
 def _log_point(stream: rr.RecordingStream, path: str, name: str, x: Array, is_seen: bool) -> None:
