@@ -47,7 +47,7 @@ class Fold:
         values = windows.transpose(0, 1, 3, 2, 4)[step, row, column]
         length = (self.bandwidth + 1) * self.size
         flat = np.bincount(self.target, weights=values.ravel(), minlength=length + 1)[:length]
-        return flat.reshape(self.bandwidth + 1, self.size)
+        return np.asarray(flat.reshape(self.bandwidth + 1, self.size), dtype=np.float64)
 
 
 class NormalMatrix(NamedTuple):
