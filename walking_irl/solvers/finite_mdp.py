@@ -112,7 +112,7 @@ class FiniteMDP:
         return x
 
     def feature_expectations(self, policy: Array | Actions) -> Array:
-        """mu = Phi' (I - gamma T_pi)'^-1 start, shape (K,), exact to rounding."""
+        """Exact mu = Phi' (I - gamma T_pi)'^-1 start, shape (K,)."""
         return self.Phi.T @ self.visits(policy)
 
     def stationary_policy(
