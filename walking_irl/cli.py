@@ -14,12 +14,14 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 import argparse
 import sys
 from collections.abc import Sequence
+from concurrent.futures import BrokenExecutor
 from pathlib import Path
+from typing import NoReturn
 
-from rich.console import Console
+from walking_irl import __version__
+from walking_irl.errors import EmptyPolyhedronError, InvalidInputError, WalkingIRLError
 
-from walking_irl import __version__, commands
-from walking_irl.errors import InvalidInputError, WalkingIRLError
+DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 EXAMPLES = """
 examples:
@@ -32,9 +34,17 @@ examples:
 """
 
 
+class Parser(argparse.ArgumentParser):
+    """Parser whose errors are one sentence, like all others."""
+
+    def error(self, message: str) -> NoReturn:
+        """Say what is wrong, and leave."""
+        self.exit(BAD_INPUT, f"walking-irl: error: {message} (see {self.prog} --help)\n")
+
+
 def build_parser() -> argparse.ArgumentParser:
     """The parser of all commands."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="walking-irl",
         description="Given how a humanoid walks, find out what it walks for.",
         epilog=EXAMPLES,
@@ -47,14 +57,16 @@ def build_parser() -> argparse.ArgumentParser:
     inspect = sub.add_parser("inspect", help="print what a recording holds")
     inspect.add_argument("file", type=Path, metavar="FILE.rrd")
     inspect.add_argument("--json", type=Path, metavar="FILE.json", help="write it as JSON, too")
-    inspect.set_defaults(run=commands.inspect)
+    inspect.set_defaults(run="inspect")
     view = sub.add_parser("view", help="open a recording in the viewer, or render it to a picture")
     view.add_argument("file", type=Path, metavar="FILE.rrd")
-    view.add_argument("--png", type=Path, help="render a picture without a screen instead")
+    view.add_argument(
+        "--png", type=Path, metavar="FILE.png", help="render a picture without a screen instead"
+    )
     view.add_argument("--frame", type=int, help="frame to render (default: the last)")
-    view.set_defaults(run=commands.view)
+    view.set_defaults(run="view")
     domains = sub.add_parser("domains", help="list domains, their objectives and solvers")
-    domains.set_defaults(run=commands.domains)
+    domains.set_defaults(run="domains")
     return parser
 
 
@@ -96,7 +108,7 @@ def _recover_parser(p: argparse.ArgumentParser) -> None:
     p.add_argument("--no-record", action="store_true", help="write no recording")
     p.add_argument("--json", type=Path, metavar="FILE.json", help="write all figures as JSON")
     p.add_argument("--quiet", action="store_true", help="print the result only")
-    p.set_defaults(run=commands.recover)
+    p.set_defaults(run="recover")
 
 
 def _gait_parser(p: argparse.ArgumentParser) -> None:
@@ -108,23 +120,54 @@ def _gait_parser(p: argparse.ArgumentParser) -> None:
     p.add_argument("--png", type=Path, metavar="FILE.png", help="draw a picture strip")
     p.add_argument("--json", type=Path, metavar="FILE.json", help="write the gait's figures")
     p.add_argument("--quiet", action="store_true", help="print nothing but errors")
-    p.set_defaults(run=commands.gait)
+    p.set_defaults(run="gait")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command; returns the exit code."""
-    args = build_parser().parse_args(argv)
-    console = Console(highlight=False, soft_wrap=True)
-    errors = Console(stderr=True, highlight=False, soft_wrap=True, markup=False)
     try:
-        return int(args.run(args, console))
+        return _run(_joined(sys.argv[1:] if argv is None else argv))
     except KeyboardInterrupt:
-        errors.print("walking-irl: interrupted before there was anything to save")
-        return 130
+        return _complain("interrupted before there was anything to save", INTERRUPTED)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # the reader of our output has left
+        return FAILED
+    except InvalidInputError as error:
+        return _complain(f"error: {error}", BAD_INPUT)
+    except EmptyPolyhedronError as error:
+        return _complain(f"no weights explain this expert: {error}", FAILED)
     except WalkingIRLError as error:
-        kind = "error" if isinstance(error, InvalidInputError) else "failed"
-        errors.print(f"walking-irl: {kind}: {error}")
-        return 2
+        return _complain(f"failed: {error}", BAD_INPUT)
+    except BrokenExecutor:
+        return _complain("failed: a worker process died; is there enough memory?", FAILED)
+    except OSError as error:
+        return _complain(f"failed: {error}", BAD_INPUT)
+
+
+def _run(argv: Sequence[str]) -> int:
+    args = build_parser().parse_args(argv)
+    from rich.console import Console  # heavy imports here: Ctrl-C is heard during them, too
+
+    from walking_irl import commands
+
+    console = Console(highlight=False, soft_wrap=True)
+    return int(getattr(commands, args.run)(args, console))
+
+
+def _joined(argv: Sequence[str]) -> list[str]:
+    """Arguments in which ``--weights -1,2`` is one: argparse would take -1,2 for an option."""
+    out: list[str] = []
+    for word in argv:
+        if out and out[-1] == "--weights" and word[:1] == "-" and word[1:2] in tuple(".0123456789"):
+            out[-1] = f"--weights={word}"
+        else:
+            out.append(word)
+    return out
+
+
+def _complain(sentence: str, code: int) -> int:
+    print("walking-irl: " + " ".join(sentence.split()), file=sys.stderr)
+    return code
 
 
 if __name__ == "__main__":

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import io
+import os
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +16,13 @@ from rich.table import Table
 
 from walking_irl.domains import DOMAINS, load
 from walking_irl.errors import InvalidInputError
-from walking_irl.report import Report, check_folder, write_json
+from walking_irl.output import check_ending, check_outputs, write_file
+from walking_irl.report import Report, write_json
 from walking_irl.session import Case, Setup, run, workers
 from walking_irl.types import Array, Iteration, Rollout, Rule
 
 INTERRUPTED = 130
+SCREENS = ("DISPLAY", "WAYLAND_DISPLAY")
 
 
 def parse_weights(text: str) -> tuple[float, ...]:
@@ -34,6 +39,11 @@ def parse_weights(text: str) -> tuple[float, ...]:
         ) from error
 
 
+def show_weights(w: Array, console: Console) -> None:
+    """Say how weights were understood."""
+    console.print("weights normalised to sum 1: " + ", ".join(f"{v:.4f}" for v in w))
+
+
 def recover(args: argparse.Namespace, console: Console) -> int:
     """``walking-irl recover``."""
     record = None if args.no_record else args.record
@@ -42,7 +52,7 @@ def recover(args: argparse.Namespace, console: Console) -> int:
         centre=args.centre,
         mode=args.mode,
         seed=args.seed,
-        weights=parse_weights(args.weights) if args.weights else None,
+        weights=None if args.weights is None else parse_weights(args.weights),
         population=args.population,
         rollouts=args.rollouts,
         noise=args.noise,
@@ -51,14 +61,20 @@ def recover(args: argparse.Namespace, console: Console) -> int:
         max_solves=args.max_solves,
         record=record,
     )
-    check_folder([record, args.json])
-    load(setup.domain)
+    check_ending(record, ".rrd")
     walks = None if record is None else record.with_suffix(".npz")
+    check_outputs([record, walks, args.json])
+    load(setup.domain)
+
+    saved: list[Path] = []
 
     def on_expert(case: Case) -> None:
         if walks is not None and case.trajectories:
             save_walks(walks, case.trajectories, case.domain.walker.joints)
+            saved.append(walks)
         if not args.quiet:
+            if setup.weights is not None and case.w_expert is not None:
+                show_weights(case.w_expert, console)
             known = f"{len(case.trajectories)} recorded walks" if case.trajectories else "itself"
             console.print(f"expert ready, known by {known}; the learner starts")
 
@@ -70,9 +86,11 @@ def recover(args: argparse.Namespace, console: Console) -> int:
         console.print(f"{setup.domain}: solving for the expert ...")
     with workers() as executor:
         report = run(setup, executor=executor, on_expert=on_expert, on_iteration=on_iteration)
+    show_report(report, console, saved[0] if saved else None)
     if args.json is not None:
         write_json(args.json, report.to_json())
-    show_report(report, console, walks if walks is not None and walks.exists() else None)
+    if report.failed_write is not None:
+        raise report.failed_write
     if report.was_interrupted:
         return INTERRUPTED
     return 0 if report.is_success else 1
@@ -128,11 +146,9 @@ def show_report(report: Report, console: Console, walks: Path | None) -> None:
 def save_walks(path: Path, walks: tuple[Rollout, ...], joints: tuple[str, ...]) -> None:
     """Write trajectories: time (n, T), q, v (n, T, nv), u (n, T, nu), joint names."""
     arrays = {key: np.array([getattr(w, key) for w in walks]) for key in ("time", "q", "v", "u")}
-    try:
-        np.savez_compressed(path, joints=np.array(joints), **arrays)
-    except OSError as error:
-        path.unlink(missing_ok=True)
-        raise InvalidInputError(f"cannot write {path}: {error.strerror or error}") from error
+    content = io.BytesIO()
+    np.savez_compressed(content, joints=np.array(joints), **arrays)  # type: ignore[arg-type]
+    write_file(path, content.getvalue())
 
 
 def gait(args: argparse.Namespace, console: Console) -> int:
@@ -142,14 +158,19 @@ def gait(args: argparse.Namespace, console: Console) -> int:
     from walking_irl.domains.humanoid.forward import check_weights
     from walking_irl.domains.humanoid.realism import figures
 
-    check_folder([args.save, args.record, args.png, args.json])
+    check_ending(args.save, ".npz", ".csv")
+    check_ending(args.record, ".rrd")
+    check_ending(args.png, ".png")
+    check_outputs([args.save, args.record, args.png, args.json])
+    if not (np.isfinite(args.seconds) and args.seconds > 0):
+        raise InvalidInputError(f"seconds must be a positive number, got {args.seconds}")
     domain = load(args.domain)
     if not isinstance(domain, Humanoid):
         raise InvalidInputError(f"gait needs humanoid or humanoid-planar, got {args.domain!r}")
     given = parse_weights(args.weights)
     w = check_weights(np.array(given))
     if not args.quiet:
-        console.print("weights normalised to sum 1: " + ", ".join(f"{v:.4f}" for v in w))
+        show_weights(w, console)
     with workers() as executor:
         response = domain.forward(w, executor)
     found = response.policy
@@ -165,7 +186,7 @@ def gait(args: argparse.Namespace, console: Console) -> int:
     if args.png is not None:
         from walking_irl.domains.humanoid.render import strip
 
-        strip(domain.walker, found, path=args.png)
+        write_file(args.png, png(strip(domain.walker, found)))
     if args.record is not None:
         _record_walk(args.record, domain, found, args.seconds, w)
     if args.json is not None:
@@ -175,6 +196,15 @@ def gait(args: argparse.Namespace, console: Console) -> int:
     return 0
 
 
+def png(picture: Any) -> bytes:
+    """A picture (height, width, 3) as the content of a PNG file."""
+    from PIL import Image
+
+    content = io.BytesIO()
+    Image.fromarray(picture).save(content, format="PNG", optimize=True)
+    return content.getvalue()
+
+
 def _record_walk(path: Path, domain: Any, found: Any, seconds: float, w: Array) -> None:
     """Closed-loop walk of a gait at half the knot timestep, as a recording."""
     from walking_irl.domains.humanoid.policy import tracking_policy
@@ -182,8 +212,6 @@ def _record_walk(path: Path, domain: Any, found: Any, seconds: float, w: Array) 
     from walking_irl.recording import record_motion
     from walking_irl.recording.gait_view import WalkerView
 
-    if not seconds > 0:
-        raise InvalidInputError(f"seconds must be positive, got {seconds}")
     policy = tracking_policy(domain.walker, found, substeps=2)
     walked = rollout(domain.walker, policy, seconds=seconds)
     rows = [f"| {o.name} | {v:.4f} |" for o, v in zip(domain.objectives, w, strict=True)]
@@ -213,7 +241,7 @@ def inspect(args: argparse.Namespace, console: Console) -> int:
     """``walking-irl inspect``."""
     from walking_irl.recording.reader import inspect_recording
 
-    check_folder([args.json])
+    check_outputs([args.json])
     content = inspect_recording(args.file)
     if args.json is not None:
         write_json(args.json, content)
@@ -243,9 +271,16 @@ def view(args: argparse.Namespace, console: Console) -> int:
     from walking_irl.recording.screenshot import open_viewer, save_screenshot
 
     if args.png is None:
+        if sys.platform.startswith("linux") and not any(map(os.environ.get, SCREENS)):
+            raise InvalidInputError(
+                "there is no screen for the viewer; render a picture with --png FILE.png, or copy "
+                "the file to a machine with a screen"
+            )
         open_viewer(args.file)
         console.print("the viewer is opening; move the frame slider to play")
     else:
+        check_ending(args.png, ".png")
+        check_outputs([args.png])
         save_screenshot(args.file, args.png, frame=args.frame)
         console.print(f"wrote {escape(str(args.png))}")
     return 0

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
-from collections.abc import Sequence
+import math
 from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -12,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from walking_irl.errors import InvalidInputError
+from walking_irl.errors import InvalidInputError, RecordingError
+from walking_irl.output import write_file
 from walking_irl.types import Array, Iteration, Objective, Rule, Status
 
 SUCCESS = (
@@ -56,6 +56,7 @@ class Report:
         seconds: Wall time by part [s].
         recording: Path of the recording, if there is one.
         was_interrupted: Whether Ctrl-C ended it.
+        failed_write: Why the recording could not be written at the end, or None.
     """
 
     domain: str
@@ -71,6 +72,7 @@ class Report:
     seconds: dict[str, float] = field(default_factory=dict)
     recording: str | None = None
     was_interrupted: bool = False
+    failed_write: RecordingError | None = None
 
     @property
     def last(self) -> Iteration:
@@ -175,33 +177,19 @@ def _entry(it: Iteration) -> dict[str, Any]:
 
 
 def write_json(path: Path, content: dict[str, Any]) -> None:
-    """Write JSON beside the target and rename it, so that no half-written file stays.
+    """Write JSON; numbers that are not finite become null.
 
     Raises:
         InvalidInputError: If the file cannot be written.
     """
-    part = path.with_name(path.name + ".part")
-    try:
-        part.write_text(json.dumps(content, indent=1, allow_nan=True) + "\n")
-        os.replace(part, path)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        raise InvalidInputError(f"cannot write {path}: {error.strerror or error}") from error
+    write_file(path, (json.dumps(_plain(content), indent=1, allow_nan=False) + "\n").encode())
 
 
-def check_folder(paths: Sequence[Path | None]) -> None:
-    """Fail before long work where a result could not be written after it.
-
-    Raises:
-        InvalidInputError: If a folder is missing or read-only, or a path is a folder.
-    """
-    for path in paths:
-        if path is None:
-            continue
-        folder = path.parent
-        if not folder.is_dir():
-            raise InvalidInputError(f"cannot write {path}: there is no folder {folder}")
-        if path.is_dir():
-            raise InvalidInputError(f"cannot write {path}: it is a folder; name a file")
-        if not os.access(folder, os.W_OK):
-            raise InvalidInputError(f"cannot write {path}: the folder {folder} is read-only")
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(v) for v in value]
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    return None if isinstance(value, float) and not math.isfinite(value) else value

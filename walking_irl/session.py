@@ -23,7 +23,7 @@ import numpy as np
 from walking_irl.centres import centre_rule
 from walking_irl.cpirl import MODES, cpirl
 from walking_irl.domains import load
-from walking_irl.errors import InvalidInputError
+from walking_irl.errors import InvalidInputError, RecordingError
 from walking_irl.report import Report
 from walking_irl.types import Array, Expert, Iteration, Response, Rollout
 
@@ -107,13 +107,17 @@ class Case:
 @contextmanager
 def workers() -> Iterator[Executor]:
     """A process pool of the machine's cores; an interrupt reaches this process only."""
+    count = os.cpu_count() or 1
     pool = ProcessPoolExecutor(
-        os.cpu_count() or 1,
+        count,
         mp_context=get_context("spawn"),
         initializer=signal.signal,
         initargs=(signal.SIGINT, signal.SIG_IGN),
     )
     try:
+        with _interrupts_held():
+            for _ in range(count):
+                pool.submit(os.getpid)  # starts a process, which inherits the held signal
         yield pool
         pool.shutdown()
     except BaseException:
@@ -121,6 +125,19 @@ def workers() -> Iterator[Executor]:
             process.terminate()
         pool.shutdown(wait=False, cancel_futures=True)
         raise
+
+
+@contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Ctrl-C waits: it would hit processes that cannot ignore it yet, and they would say so."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def prepare(setup: Setup, executor: Executor | None) -> Case:
@@ -192,7 +209,8 @@ def run(
     """Recover the weights of one expert.
 
     Ctrl-C after the first iteration ends the run with a report of what is done, marked
-    interrupted; the recording is complete up to there.
+    interrupted; the recording is complete up to there. A recording that cannot be written at the
+    end is told by the report, too, so that the result is not lost with it.
 
     Args:
         setup: What to do.
@@ -202,7 +220,7 @@ def run(
 
     Raises:
         InvalidInputError: If the setup is wrong.
-        RecordingError: If the recording cannot be written.
+        RecordingError: If the recording cannot be written; before any iteration.
     """
     watch = Stopwatch()
     if setup.record is not None:
@@ -223,12 +241,20 @@ def run(
         true_mu=case.true_mu,
     )
     try:
-        _learn(setup, case, report, watch, executor, on_iteration)
+        try:
+            _learn(setup, case, report, watch, executor, on_iteration)
+        except RecordingError as error:
+            if not report.iterations:
+                raise
+            report.failed_write, report.recording = error, None
         report.recovered_mu = case.forward(report.w).mu if report.w_expert is not None else None
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as interrupt:
         if not report.iterations:
             raise
         report.was_interrupted = True
+        notes = getattr(interrupt, "__notes__", [])  # of a recording that could not be written
+        if notes:
+            report.failed_write, report.recording = RecordingError(notes[0]), None
     report.seconds = watch.finish()
     return report
 

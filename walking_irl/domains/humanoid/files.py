@@ -1,12 +1,14 @@
 """Gaits as files that anyone can read: ``time`` and one column per joint, ``.npz`` or ``.csv``.
 
-A file holds one whole gait cycle at equal time steps, the last row not repeated: joint angles [rad],
-root positions [m] and angles [rad], by the model's joint names.
+A file holds one whole gait cycle at equal time steps, the last row not repeated: joint angles
+[rad], root positions [m] and angles [rad], by the model's joint names.
 """
 
 from __future__ import annotations
 
 import csv
+import io
+import zlib
 from pathlib import Path
 from zipfile import BadZipFile
 
@@ -16,9 +18,11 @@ from scipy.interpolate import CubicSpline
 from walking_irl.domains.humanoid.anatomy import Walker
 from walking_irl.domains.humanoid.gait import Gait, whole_cycle
 from walking_irl.errors import InvalidInputError
+from walking_irl.output import write_file
 from walking_irl.types import Array
 
 N_KNOTS = 40
+LEAST_STEP = 0.05  # [m]
 UNEVEN = 1e-3
 """Largest relative deviation of a time step from the mean step."""
 
@@ -35,18 +39,16 @@ def save_gait(path: Path, gait: Gait, walker: Walker) -> None:
         **dict(zip(walker.joints, q.T, strict=True)),
     }
     _check_ending(path)
-    try:
-        if path.suffix == ".npz":
-            np.savez_compressed(path, **columns)  # type: ignore[arg-type]
-        else:
-            with path.open("w", newline="") as file:
-                writer = csv.writer(file)
-                writer.writerow(columns)
-                writer.writerows(
-                    zip(*(map(repr, c.tolist()) for c in columns.values()), strict=True)
-                )
-    except OSError as error:
-        raise InvalidInputError(f"cannot write {path}: {error.strerror or error}") from error
+    if path.suffix == ".npz":
+        packed = io.BytesIO()
+        np.savez_compressed(packed, **columns)
+        write_file(path, packed.getvalue())
+    else:
+        text = io.StringIO(newline="")
+        writer = csv.writer(text)
+        writer.writerow(columns)
+        writer.writerows(zip(*(map(repr, c.tolist()) for c in columns.values()), strict=True))
+        write_file(path, text.getvalue().encode())
 
 
 def load_gait(path: Path, walker: Walker) -> Gait:
@@ -54,7 +56,7 @@ def load_gait(path: Path, walker: Walker) -> Gait:
 
     Raises:
         InvalidInputError: If the file cannot be read, or columns are missing, unknown, of unequal
-            length or not finite, or time steps are unequal.
+            length or not finite, or time steps are unequal, or the gait does not go forward.
     """
     _check_ending(path)
     columns = _read(path)
@@ -75,7 +77,12 @@ def load_gait(path: Path, walker: Walker) -> Gait:
     steps = np.diff(table[:, 0])
     if steps.min() <= 0 or np.ptp(steps) > UNEVEN * steps.mean():
         raise InvalidInputError(f"{path} needs equal, increasing time steps over one gait cycle")
-    return _symmetric(table[:, 1:], float(steps.mean()) * len(table), walker)
+    gait = _symmetric(table[:, 1:], float(steps.mean()) * len(table), walker)
+    if not gait.step_length > LEAST_STEP:
+        raise InvalidInputError(
+            f"{path} is not a walk: it moves {gait.step_length:.3g} m forward per step"
+        )
+    return gait
 
 
 def _symmetric(q: Array, period: float, walker: Walker) -> Gait:
@@ -107,6 +114,21 @@ def _resample(q: Array, n: int, stride: float | None = None) -> Array:
     return np.asarray(CubicSpline(phase, steady, bc_type="periodic")(at) + np.outer(at, drift))
 
 
+UNREADABLE = (
+    OSError,
+    ValueError,
+    EOFError,
+    TypeError,
+    AttributeError,
+    KeyError,
+    NotImplementedError,
+    BadZipFile,
+    csv.Error,
+    zlib.error,
+)
+"""What NumPy and csv raise on files that they cannot read; an .npy named .npz is one of them."""
+
+
 def _check_ending(path: Path) -> None:
     if path.suffix not in (".npz", ".csv"):
         raise InvalidInputError(f"a gait file ends in .npz or .csv, got {path.name!r}")
@@ -118,10 +140,12 @@ def _read(path: Path) -> dict[str, Array]:
             with np.load(path, allow_pickle=False) as data:
                 return {name: np.asarray(data[name], dtype=float).ravel() for name in data.files}
         with path.open(newline="") as file:
-            names, *rows = list(csv.reader(file))
+            names, *rows = [row for row in csv.reader(file) if row]
+        if len(set(names)) < len(names):
+            raise ValueError("a column appears twice")
         table = np.array(rows, dtype=float).reshape(len(rows), -1)
         return dict(zip(names, table.T, strict=True))
     except FileNotFoundError as error:
         raise InvalidInputError(f"there is no file {path}") from error
-    except (OSError, ValueError, EOFError, BadZipFile) as error:
+    except UNREADABLE as error:
         raise InvalidInputError(f"{path} is not a readable {path.suffix} table: {error}") from error

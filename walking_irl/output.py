@@ -1,0 +1,69 @@
+"""Result files: checked before long work, and complete under their name or not there at all."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from walking_irl.errors import InvalidInputError
+
+
+def write_file(path: Path, content: bytes) -> None:
+    """Write beside the target and rename, so that no half-written file stays.
+
+    Raises:
+        InvalidInputError: If the file cannot be written; what was there before is still there.
+    """
+    _check_name(path)
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        try:
+            with part.open("xb") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
+            part.replace(path)
+        except BaseException:
+            part.unlink(missing_ok=True)
+            raise
+    except OSError as error:
+        raise InvalidInputError(f"cannot write {path}: {error.strerror or error}") from error
+
+
+def check_outputs(paths: Sequence[Path | None]) -> None:
+    """Fail before long work where a result could not be written after it.
+
+    Raises:
+        InvalidInputError: If a folder is missing or read-only, two results have one name, or a name
+            is a folder's or a device's.
+    """
+    given = [path for path in paths if path is not None]
+    for path in given:
+        _check_name(path)
+        if given.count(path) > 1:
+            raise InvalidInputError(f"two results cannot both be written to {path}; name two files")
+        if not os.access(path.parent, os.W_OK):
+            raise InvalidInputError(f"cannot write {path}: the folder {path.parent} is read-only")
+
+
+def check_ending(path: Path | None, *endings: str) -> None:
+    """Fail where a file's name has another ending than its content.
+
+    Raises:
+        InvalidInputError: If it has.
+    """
+    if path is not None and path.suffix not in endings:
+        raise InvalidInputError(f"expected a file name in {' or '.join(endings)}, got {path}")
+
+
+def _check_name(path: Path) -> None:
+    try:
+        if not path.parent.is_dir():
+            raise InvalidInputError(f"cannot write {path}: there is no folder {path.parent}")
+        if path.is_dir():
+            raise InvalidInputError(f"cannot write {path}: it is a folder; name a file")
+        if path.exists() and not path.is_file():
+            raise InvalidInputError(f"cannot write {path}: it is a device; name an ordinary file")
+    except OSError as error:
+        raise InvalidInputError(f"cannot write {path}: {error.strerror or error}") from error
