@@ -70,7 +70,7 @@ def polished(a: Array, goal: Array, path: Path) -> Path:
             part[..., free] if part.ndim == 2 else part for part in jacobians(z, goal)
         )
         g = a @ J
-        multipliers: Array = -np.linalg.lstsq(E.T, g, rcond=None)[0]
+        multipliers = -np.asarray(np.linalg.lstsq(E.T, g, rcond=None)[0], dtype=np.float64)
         Z = null_space(E)
         H = hessian(z, goal, a, multipliers)[np.ix_(free, free)]
         values, vectors = np.linalg.eigh(Z.T @ H @ Z)
