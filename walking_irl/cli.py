@@ -75,9 +75,14 @@ def _recover_parser(p: argparse.ArgumentParser) -> None:
     p.add_argument("--centre", default="ac", help="query point: ac, cg, mvie or cc (%(default)s)")
     p.add_argument(
         "--mode",
-        default="optimal",
+        default=None,
         help="optimal: the expert is optimal; set: to a tolerance; minimise: it need not be "
-        "(%(default)s)",
+        "(default: optimal, minimise for a suboptimal expert)",
+    )
+    p.add_argument(
+        "--expert",
+        default="optimal",
+        help="optimal, or suboptimal: a spoilt walk, known exactly (%(default)s)",
     )
     hidden = p.add_mutually_exclusive_group()
     hidden.add_argument(

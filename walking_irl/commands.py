@@ -50,7 +50,8 @@ def recover(args: argparse.Namespace, console: Console) -> int:
     setup = Setup(
         domain=args.domain,
         centre=args.centre,
-        mode=args.mode,
+        mode=args.mode or ("minimise" if args.expert == "suboptimal" else "optimal"),
+        expert=args.expert,
         seed=args.seed,
         weights=None if args.weights is None else parse_weights(args.weights),
         population=args.population,

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 THREADS = 2
 """Threads of one learner's solve: solves follow one another, so the cores would idle."""
+MIN_WEIGHT = 0.005
+"""The learner's lower bound of every weight; the gait of a vanishing weight is ill-defined."""
 PHYSICAL = 0.05
 """Largest root force of a demonstration [body weights]: more is not this body's walk."""
 
@@ -30,11 +32,14 @@ def humanoid_case(domain: Humanoid, setup: Setup, executor: Executor | None) -> 
     """The expert that a setup asks for."""
     from walking_irl.session import Case
 
-    protocol = Protocol(setup.rollouts, setup.noise, setup.disturbance)
+    is_spoilt = setup.expert == "suboptimal"
+    protocol = Protocol(0 if is_spoilt else setup.rollouts, setup.noise, setup.disturbance)
     if setup.demonstration is not None:
         gait = load_gait(setup.demonstration, domain.walker)
         expert = exact_expert(gait, _folded(domain, gait, setup.demonstration))
-        case = Case(domain, expert, domain.learner(expert, THREADS))
+        case = Case(
+            domain, expert, domain.learner(expert, THREADS), min_weight=MIN_WEIGHT
+        )
     else:
         rng = np.random.default_rng(setup.seed)
         if setup.population not in POPULATIONS:
@@ -45,15 +50,19 @@ def humanoid_case(domain: Humanoid, setup: Setup, executor: Executor | None) -> 
         w_E = POPULATIONS[setup.population](rng)
         if setup.weights is not None:
             w_E = check_weights(np.asarray(setup.weights))
-        made = domain.demonstrate(w_E, rng, protocol, executor)
+        if is_spoilt:
+            made = domain.demonstrate_poorly(w_E, rng, executor)
+        else:
+            made = domain.demonstrate(w_E, rng, protocol, executor)
         gait = made.gait
         case = Case(
             domain,
             made.expert,
             domain.learner(made.expert, THREADS),
             measure=domain.remeasure(protocol, setup.seed, executor),
+            min_weight=MIN_WEIGHT,
             w_expert=w_E,
-            true_mu=-made.optimum.folded,
+            true_mu=made.expert.mu if is_spoilt else -made.optimum.folded,
             trajectories=made.rollouts,
         )
     if setup.record is not None:

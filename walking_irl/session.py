@@ -27,12 +27,10 @@ from walking_irl.errors import InvalidInputError, RecordingError
 from walking_irl.report import Report
 from walking_irl.types import Array, Expert, Iteration, Response, Rollout
 
-MIN_WEIGHT = 0.005
-"""The learner's lower bound of every weight."""
 PROBE = 1e-4
 """Relative suboptimality whose extreme weights are probed at the end."""
 MAX_SOLVES = 20
-SUBOPTIMAL_SOLVES = 40
+EXPERTS = ("optimal", "suboptimal")
 
 
 @dataclass(frozen=True)
@@ -46,6 +44,7 @@ class Setup:
         seed: Draws hidden weights and disturbances.
         weights: Hidden weights instead of drawn ones, or None.
         population: "typical" or "uniform" hidden weights.
+        expert: "optimal", or "suboptimal": then known exactly, whatever ``rollouts`` says.
         rollouts: Trajectories recorded of the expert; 0 for its exact features.
         noise: Standard deviation of their disturbance [rad/s].
         disturbance: "initial" or "kicks".
@@ -60,6 +59,7 @@ class Setup:
     seed: int = 0
     weights: tuple[float, ...] | None = None
     population: str = "typical"
+    expert: str = "optimal"
     rollouts: int = 20
     noise: float = 0.02
     disturbance: str = "initial"
@@ -71,6 +71,9 @@ class Setup:
         centre_rule(self.centre)
         if self.mode not in MODES:
             raise InvalidInputError(f"unknown mode {self.mode!r}; choose from {', '.join(MODES)}")
+        if self.expert not in EXPERTS:
+            choices = " or ".join(EXPERTS)
+            raise InvalidInputError(f"unknown expert {self.expert!r}; choose {choices}")
         if self.seed < 0:
             raise InvalidInputError(f"seed must be a whole number >= 0, got {self.seed}")
         if self.max_solves < 1:
@@ -86,6 +89,7 @@ class Case:
         expert: What the learner receives.
         forward: The learner's forward solver.
         measure: Measures a policy as the expert was measured, or None.
+        min_weight: The learner's lower bound of every weight.
         w_expert: Hidden weights, or None.
         true_mu: Features of the expert's own policy without noise, or None.
         world: What a recording shows beside the polyhedron, or None.
@@ -97,6 +101,7 @@ class Case:
     expert: Expert
     forward: Callable[[Array], Response]
     measure: Any = None
+    min_weight: float = 0.0
     w_expert: Array | None = None
     true_mu: Array | None = None
     world: Any = None
@@ -157,7 +162,12 @@ def prepare(setup: Setup, executor: Executor | None) -> Case:
     rng = np.random.default_rng(setup.seed)
     K = len(domain.objectives)
     w_E = _given(setup, K) if setup.weights else rng.dirichlet(np.ones(K))
-    expert = domain.expert(w_E, rng)
+    if setup.expert == "optimal":
+        expert = domain.expert(w_E, rng)
+    elif hasattr(domain, "suboptimal_expert"):
+        expert = domain.suboptimal_expert(w_E, rng)
+    else:
+        raise InvalidInputError(f"domain {setup.domain} has no suboptimal expert")
     return Case(domain, expert, domain.forward, w_expert=w_E, true_mu=expert.mu)
 
 
@@ -289,7 +299,7 @@ def _learn(
             centre=setup.centre,
             mode=setup.mode,  # type: ignore[arg-type]
             max_solves=setup.max_solves,
-            min_weight=MIN_WEIGHT,
+            min_weight=case.min_weight,
             rng=np.random.default_rng(setup.seed),
             measure=case.measure,
             executor=executor,

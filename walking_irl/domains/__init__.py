@@ -31,12 +31,37 @@ def _lqr(**options: Any) -> Any:
     return LQR(**options)
 
 
+def _gridworld(**options: Any) -> Any:
+    from walking_irl.domains.gridworld import Gridworld
+
+    return Gridworld(**{"cells": 3, **options})
+
+
+def _driving(**options: Any) -> Any:
+    from walking_irl.domains.driving import Driving
+
+    return Driving(**options)
+
+
+def _walking_path(**options: Any) -> Any:
+    from walking_irl.domains.walking_path import WalkingPath
+
+    return WalkingPath(**options)
+
+
 DOMAINS: dict[str, Entry] = {
     "humanoid": Entry(
         _humanoid(False), "3-D walker, 25 joints", "trajectory optimisation by inverse dynamics"
     ),
     "humanoid-planar": Entry(
         _humanoid(True), "planar walker, 14 joints", "trajectory optimisation by inverse dynamics"
+    ),
+    "gridworld": Entry(
+        _gridworld, "16 x 16 cells, 9 patches", "policy iteration, exact linear solves"
+    ),
+    "driving": Entry(_driving, "three-lane road, 1531 states", "policy iteration"),
+    "walking-path": Entry(
+        _walking_path, "walking paths seen from above", "optimal control, exact sensitivities"
     ),
     "lqr": Entry(_lqr, "linear dynamics, quadratic costs", "Riccati equation in closed form"),
 }

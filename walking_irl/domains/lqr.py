@@ -7,12 +7,15 @@ section 7.2; closed form by one scalar Riccati equation per axis.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from walking_irl.errors import InvalidInputError
 from walking_irl.types import Array, Expert, Objective, Response
+
+SPOILT_BY = 0.25
+"""Relative error of a sub-optimal expert's gains."""
 
 
 @dataclass(frozen=True)
@@ -100,3 +103,7 @@ class LQR:
             k = k * (1 + self.perturbation * rng.uniform(-1.0, 1.0, len(k)))
             k = np.clip(k, -0.99, -0.1)
         return Expert(self.evaluate(k), np.zeros(len(k)), demonstration=k)
+
+    def suboptimal_expert(self, w_E: Array, rng: np.random.Generator) -> Expert:
+        """Expert with gains up to 25 % off, if this domain perturbs none already."""
+        return replace(self, perturbation=self.perturbation or SPOILT_BY).expert(w_E, rng)

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from walking_irl.domains.humanoid.anatomy import Walker, load_walker
 from walking_irl.domains.humanoid.demonstrator import OptimalGait, best_gait
-from walking_irl.domains.humanoid.forward import Imitator, search
+from walking_irl.domains.humanoid.forward import Imitator, search, solver_for
 from walking_irl.domains.humanoid.gait import Gait
 from walking_irl.domains.humanoid.objectives import OBJECTIVES
 from walking_irl.domains.humanoid.policy import tracking_policy
 from walking_irl.domains.humanoid.protocol import MANY, Measurement, Protocol, measure
 from walking_irl.domains.humanoid.rollout import averaged_gait
+from walking_irl.domains.humanoid.solver import stage
 from walking_irl.types import Array, Expert, Objective, Response, Rollout
 
+SPOILT_BY = np.deg2rad(1.0)
+TO_PHYSICS = tuple(stage(p, 12, 1e-9, tether=1.0) for p in (1e4, 1e5, 1e6))
+"""Makes a shaken gait physical while it stays near itself."""
 SUBOPTIMALITY = 1e-4
 """How far from optimal an expert may be, relative to its costs: what contact jumps leave open."""
 
@@ -112,6 +116,25 @@ class Humanoid:
         policy = tracking_policy(self.walker, gait)
         shown = averaged_gait(self.walker, measured.rollouts, policy, skip=protocol.skip)
         return Demonstration(expert_from(measured, shown), gait, optimum, measured.rollouts)
+
+    def demonstrate_poorly(
+        self, w_E: Array, rng: np.random.Generator, executor: Executor | None = None
+    ) -> Demonstration:
+        """A walk that no weights make optimal: the best gait, shaken, then only made physical.
+
+        Args:
+            w_E: Weights of the gait that is spoilt, shape (6,).
+            rng: Source of the search's hops and of the shake.
+            executor: Runs independent solves side by side.
+        """
+        search_rng, shake_rng = rng.spawn(2)
+        optimum = best_gait(self.planar, w_E, search_rng, executor)
+        solver = solver_for(self.planar)
+        start = solver.shake(optimum.x, SPOILT_BY, shake_rng)
+        spoilt = solver.solve(w_E, start, TO_PHYSICS)
+        gait = Gait.from_vector(spoilt.x, len(self.walker.joints))
+        expert = replace(exact_expert(gait, spoilt.folded), suboptimality=0.0)
+        return Demonstration(expert, gait, optimum, ())
 
     def learner(self, expert: Expert, threads: int = 1) -> Imitator:
         """The learner's forward solver: it starts from the demonstrated gait."""
