@@ -38,7 +38,7 @@ class FallError(WalkingIRLError):
         time: When it fell [s].
     """
 
-    def __init__(self, message: str, time: float) -> None:
+    def __init__(self, message: str, time: float = float("nan")) -> None:  # picklable
         super().__init__(message)
         self.time = time
 

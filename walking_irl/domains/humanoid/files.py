@@ -137,7 +137,7 @@ def _check_ending(path: Path) -> None:
 def _read(path: Path) -> dict[str, Array]:
     try:
         if path.suffix == ".npz":
-            with np.load(path, allow_pickle=False) as data:
+            with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
                 return {name: np.asarray(data[name], dtype=float).ravel() for name in data.files}
         with path.open(newline="") as file:
             names, *rows = [row for row in csv.reader(file) if row]
