@@ -12,6 +12,14 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 from rich.markup import escape
+from rich.progress import (
+    BarColumn,
+    Progress,
+    SpinnerColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 from rich.table import Table
 
 from walking_irl.domains import DOMAINS, load
@@ -69,7 +77,25 @@ def recover(args: argparse.Namespace, console: Console) -> int:
 
     saved: list[Path] = []
 
+    progress = Progress(
+        SpinnerColumn(),
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+        console=console,
+        transient=True,
+        disable=args.quiet or not console.is_terminal,
+    )
+    task = progress.add_task("solving for the expert", total=None)
+
     def on_expert(case: Case) -> None:
+        total = setup.max_solves + 2 * len(case.domain.objectives)
+        progress.update(task, total=total, completed=0, description="first solve")
+        case.watch(
+            lambda i, cost: progress.update(task, description=f"solver iteration {i}, J {cost:.5f}")
+        )
         if walks is not None and case.trajectories:
             save_walks(walks, case.trajectories, case.domain.walker.joints)
             saved.append(walks)
@@ -80,12 +106,14 @@ def recover(args: argparse.Namespace, console: Console) -> int:
             console.print(f"expert ready, known by {known}; the learner starts")
 
     def on_iteration(it: Iteration, report: Report) -> None:
+        probing = {"description": "probing the intervals"} if it.rule is Rule.PROBE else {}
+        progress.update(task, completed=it.k + 1, **probing)
         if not args.quiet:
             console.print(progress_line(it, report))
 
     if not args.quiet:
         console.print(f"{setup.domain}: solving for the expert ...")
-    with workers() as executor:
+    with workers() as executor, progress:
         report = run(setup, executor=executor, on_expert=on_expert, on_iteration=on_iteration)
     show_report(report, console, saved[0] if saved else None)
     if args.json is not None:
@@ -103,7 +131,7 @@ def progress_line(it: Iteration, report: Report) -> str:
     solver = it.response.info.get("iterations")
     detail = f", {solver} solver iterations" if solver else ""
     rule = {Rule.CENTRE: "centre", Rule.NEWTON: "newton", Rule.PROBE: "probe "}[it.rule]
-    scale = abs(float(it.w @ report.expert_mu))
+    scale = abs(float(it.w @ report.expert.mu))
     return (
         f"  {it.k + 1:3d} {rule}  regret {100 * it.regret / scale:9.5f} %  "
         f"certificate {it.certificate:.1e}  widest interval {width:.4f}{detail}"
@@ -129,6 +157,13 @@ def show_report(report: Report, console: Console, walks: Path | None) -> None:
     out = report.to_json()
     console.print(f"ended: {report.status}")
     console.print(f"certificate {report.last.certificate:.2e} (return that some mixture may lose)")
+    found = report.recovery
+    low, high = found.bracket
+    console.print(f"the expert is suboptimal by {low:.1e} to {high:.1e}")
+    if found.weakest is not None:
+        console.print(
+            f"least certain: {found.weakest} (condition number {found.condition_number:.0f})"
+        )
     if report.l1_error is not None:
         inside = "inside" if report.contains_expert else "NOT inside"
         console.print(f"L1 error {report.l1_error:.5f}; hidden weights {inside} the intervals")

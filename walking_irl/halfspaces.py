@@ -221,7 +221,8 @@ def _lawrence(corners: Array, seed: int) -> float:
     corners, det = corners[det > 1e-300], det[det > 1e-300]
     try:
         v = np.linalg.solve(corners, np.ones((len(corners), n, 1)))[..., 0]
-        gamma = np.linalg.solve(np.swapaxes(corners, 1, 2), np.tile(c[:, None], (len(v), 1, 1)))
+        right: Array = np.tile(c[:, None], (len(v), 1, 1))
+        gamma: Array = np.linalg.solve(np.swapaxes(corners, 1, 2), right)
     except np.linalg.LinAlgError:
         return -1.0
     with np.errstate(all="ignore"):

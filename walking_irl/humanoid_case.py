@@ -37,9 +37,7 @@ def humanoid_case(domain: Humanoid, setup: Setup, executor: Executor | None) -> 
     if setup.demonstration is not None:
         gait = load_gait(setup.demonstration, domain.walker)
         expert = exact_expert(gait, _folded(domain, gait, setup.demonstration))
-        case = Case(
-            domain, expert, domain.learner(expert, THREADS), min_weight=MIN_WEIGHT
-        )
+        case = Case(domain, expert, domain.learner(expert, THREADS), min_weight=MIN_WEIGHT)
     else:
         rng = np.random.default_rng(setup.seed)
         if setup.population not in POPULATIONS:
@@ -65,6 +63,7 @@ def humanoid_case(domain: Humanoid, setup: Setup, executor: Executor | None) -> 
             true_mu=made.expert.mu if is_spoilt else -made.optimum.folded,
             trajectories=made.rollouts,
         )
+    case.watch = lambda f: setattr(solver_for(domain.planar, THREADS), "watch", f)
     if setup.record is not None:
         from walking_irl.recording.gait_view import WalkerView
 

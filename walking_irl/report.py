@@ -13,7 +13,8 @@ import numpy as np
 
 from walking_irl.errors import InvalidInputError, RecordingError
 from walking_irl.output import write_file
-from walking_irl.types import Array, Iteration, Objective, Rule, Status
+from walking_irl.recovery import Recovery, summarise
+from walking_irl.types import Array, Expert, Iteration, Objective, Rule, Status
 
 SUCCESS = (
     Status.MATCHED,
@@ -50,7 +51,7 @@ class Report:
         seed: Seed, or None where weights were given.
         w_expert: Hidden weights, shape (K,), or None for a demonstration of unknown weights.
         iterations: All that CPIRL yielded.
-        expert_mu: The expert's feature expectations, shape (K,).
+        expert: What the learner was told of the expert.
         true_mu: Of the expert's optimal policy without noise, for scoring; or None.
         recovered_mu: Of the best policy for the recovered weights, for scoring; or None.
         seconds: Wall time by part [s].
@@ -65,7 +66,7 @@ class Report:
     mode: str
     seed: int | None
     w_expert: Array | None
-    expert_mu: Array
+    expert: Expert
     true_mu: Array | None = None
     iterations: list[Iteration] = field(default_factory=list)
     recovered_mu: Array | None = None
@@ -84,6 +85,11 @@ class Report:
         if not self.iterations:
             raise InvalidInputError("the run ended before its first forward solve")
         return self.iterations[-1]
+
+    @property
+    def recovery(self) -> Recovery:
+        """What was found, how sure it is, and what limits it."""
+        return summarise(self.iterations, self.expert, self.objectives)
 
     @property
     def w(self) -> Array:
@@ -155,11 +161,23 @@ class Report:
             "probe_solves": sum(it.rule is Rule.PROBE for it in self.iterations),
             "solves_to_1pct": self.solves_to_1pct,
             "status": self.status,
+            "summary": _summary(self.recovery),
             "seconds": self.seconds,
             "history": [_entry(it) for it in self.iterations],
             "recording": self.recording,
             "versions": versions(),
         }
+
+
+def _summary(r: Recovery) -> dict[str, Any]:
+    return {
+        "rule": r.rule,
+        "bracket": list(r.bracket),
+        "volume_ratio": r.volume_ratio,
+        "condition_number": r.condition_number,
+        "weakest": r.weakest,
+        "noise": r.noise.tolist(),
+    }
 
 
 def _entry(it: Iteration) -> dict[str, Any]:

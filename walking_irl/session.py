@@ -95,6 +95,7 @@ class Case:
         world: What a recording shows beside the polyhedron, or None.
         motion: Maps a policy to what the world shows of it.
         trajectories: What was recorded of the expert.
+        watch: Hands the learner's solver a function of its iteration and cost.
     """
 
     domain: Any
@@ -107,6 +108,7 @@ class Case:
     world: Any = None
     motion: Callable[[Any], Any] = field(default=lambda policy: None)
     trajectories: tuple[Rollout, ...] = ()
+    watch: Callable[[Callable[[int, float], None]], None] = field(default=lambda f: None)
 
 
 @contextmanager
@@ -247,7 +249,7 @@ def run(
         mode=setup.mode,
         seed=setup.seed if setup.weights is None and setup.demonstration is None else None,
         w_expert=case.w_expert,
-        expert_mu=case.expert.mu,
+        expert=case.expert,
         true_mu=case.true_mu,
     )
     try:

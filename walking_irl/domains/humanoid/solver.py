@@ -12,7 +12,7 @@ gait that it saw. :func:`decrement` tells afterwards whether that gait is a smoo
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -85,10 +85,16 @@ class _State(NamedTuple):
 
 
 class GaitSolver:
-    """Minimises w.G over the gaits of a transcription."""
+    """Minimises w.G over the gaits of a transcription.
+
+    Attributes:
+        problem: The transcription.
+        watch: Called after every iteration with its number and the cost, or None.
+    """
 
     def __init__(self, problem: Transcription) -> None:
         self.problem = problem
+        self.watch: Callable[[int, float], None] | None = None
         windows = Windows(problem.n_knots, problem.walker.mirror)
         self.fold = Fold(problem.n_knots, problem.nv, windows)
 
@@ -198,6 +204,8 @@ class _Descent:
         iteration = 0
         for iteration in range(1, self.stage.max_iter + 1):  # noqa: B007
             found, decrease, is_step = self.step(at)
+            if self.solver.watch is not None:
+                self.solver.watch(iteration, 2 * found.cost)
             if is_step:
                 passed.append(found.ev.folded())
                 self.failures = 0
