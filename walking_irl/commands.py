@@ -106,8 +106,9 @@ def recover(args: argparse.Namespace, console: Console) -> int:
             console.print(f"expert ready, known by {known}; the learner starts")
 
     def on_iteration(it: Iteration, report: Report) -> None:
-        probing = {"description": "probing the intervals"} if it.rule is Rule.PROBE else {}
-        progress.update(task, completed=it.k + 1, **probing)
+        progress.update(task, completed=it.k + 1)
+        if it.rule is Rule.PROBE:
+            progress.update(task, description="probing the intervals")
         if not args.quiet:
             console.print(progress_line(it, report))
 

@@ -219,14 +219,15 @@ def _lawrence(corners: Array, seed: int) -> float:
     c = np.random.default_rng(seed).normal(size=n)
     det = np.abs(np.linalg.det(corners))
     corners, det = corners[det > 1e-300], det[det > 1e-300]
+    ones: Array = np.ones((len(corners), n, 1))
+    right: Array = np.tile(c[:, None], (len(corners), 1, 1))
     try:
-        v = np.linalg.solve(corners, np.ones((len(corners), n, 1)))[..., 0]
-        right: Array = np.tile(c[:, None], (len(v), 1, 1))
-        gamma: Array = np.linalg.solve(np.swapaxes(corners, 1, 2), right)
+        v: Array = np.asarray(np.linalg.solve(corners, ones))[..., 0]
+        gamma: Array = np.asarray(np.linalg.solve(np.swapaxes(corners, 1, 2), right))[..., 0]
     except np.linalg.LinAlgError:
         return -1.0
     with np.errstate(all="ignore"):
-        terms = (v @ c) ** n / (det * np.prod(gamma[..., 0], axis=1))
+        terms = (v @ c) ** n / (det * np.prod(gamma, axis=1))
     return float(terms.sum() / math.factorial(n))
 
 

@@ -139,8 +139,8 @@ def _read(path: Path) -> dict[str, Array]:
         if path.suffix == ".npz":
             with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
                 return {name: np.asarray(data[name], dtype=float).ravel() for name in data.files}
-        with path.open(newline="") as file:
-            names, *rows = [row for row in csv.reader(file) if row]
+        with path.open(newline="") as text:
+            names, *rows = [row for row in csv.reader(text) if row]
         if len(set(names)) < len(names):
             raise ValueError("a column appears twice")
         table = np.array(rows, dtype=float).reshape(len(rows), -1)
