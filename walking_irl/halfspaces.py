@@ -222,12 +222,12 @@ def _lawrence(corners: Array, seed: int) -> float:
     ones: Array = np.ones((len(corners), n, 1))
     right: Array = np.tile(c[:, None], (len(corners), 1, 1))
     try:
-        v: Array = np.asarray(np.linalg.solve(corners, ones))[..., 0]
-        gamma: Array = np.asarray(np.linalg.solve(np.swapaxes(corners, 1, 2), right))[..., 0]
+        v: Array = np.linalg.solve(corners, ones)
+        gamma: Array = np.linalg.solve(np.swapaxes(corners, 1, 2), right)
     except np.linalg.LinAlgError:
         return -1.0
     with np.errstate(all="ignore"):
-        terms = (v @ c) ** n / (det * np.prod(gamma, axis=1))
+        terms = (v[..., 0] @ c) ** n / (det * np.prod(gamma[..., 0], axis=1))
     return float(terms.sum() / math.factorial(n))
 
 
