@@ -1,0 +1,118 @@
+"""Runs the tasks of a table, in parallel and resumably: each outcome is kept in a JSON file."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor, as_completed
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from walking_irl import __version__
+from walking_irl.experiments.table import COLUMNS, Table, machine, summary
+from walking_irl.experiments.tasks import Task, run_task
+
+Progress = Callable[[str, int, int], None]
+"""Called with the table's name, tasks done, tasks in all."""
+
+
+NOTES = (
+    "Solves end with the first success, or with the method's own end or budget.",
+    "Time in queries is all but the forward solves; for CPIRL it includes the weight intervals of "
+    "every iteration, which no rival computes.",
+    "n/a in a column: the method has no such figure (signed weights are no estimate on the simplex; "
+    "only CPIRL bounds weights).",
+)
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row: its labels and the task to repeat over seeds; or why there is none."""
+
+    setting: str
+    method: str
+    task: Task | None
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Runner:
+    """Where and how tasks run.
+
+    Attributes:
+        executor: Runs seeds side by side; None runs them here, one after the other.
+        cache: Folder of finished outcomes, or None.
+        progress: Told of every finished task, or None.
+    """
+
+    executor: Executor | None = None
+    cache: Path | None = None
+    progress: Progress | None = None
+
+    def table(
+        self, name: str, title: str, rows: Sequence[Row], seeds: int, notes: Sequence[str] = ()
+    ) -> Table:
+        """Run every row over ``seeds`` seeds and summarise it."""
+        tasks = [replace(r.task, seed=s) for r in rows if r.task for s in range(seeds)]
+        outcomes = self.outcomes(name, tasks)
+        lines, start = [], 0
+        reasons = []
+        for row in rows:
+            if row.task is None:
+                lines.append((row.setting, row.method, *["n/a"] * (len(COLUMNS) - 2)))
+                reasons.append(f"n/a for {row.method} ({row.setting}): {row.reason}")
+                continue
+            part = outcomes[start : start + seeds]
+            lines.append(summary(row.setting, row.method, part))
+            errors = [o["error"] for o in part if o["error"]]
+            if errors:
+                label = f"{row.method} ({row.setting})"
+                reasons.append(f"{label} failed on {len(errors)} seeds, first: {errors[0]}")
+            start += seeds
+        raw = tuple({**t.key(), **o} for t, o in zip(tasks, outcomes, strict=True))
+        header = {"seeds": seeds, **machine()}
+        return Table(name, title, COLUMNS, tuple(lines), (*NOTES, *notes, *reasons), header, raw)
+
+    def outcomes(self, name: str, tasks: Sequence[Task]) -> list[dict[str, Any]]:
+        """Outcome of each task, from the cache where it is there."""
+        found = [self._cached(task) for task in tasks]
+        missing = [i for i, outcome in enumerate(found) if outcome is None]
+        n_done = len(tasks) - len(missing)
+        for i, outcome in self._run(tasks, missing):
+            found[i] = outcome
+            self._keep(tasks[i], outcome)
+            n_done += 1
+            if self.progress is not None:
+                self.progress(name, n_done, len(tasks))
+        return [outcome for outcome in found if outcome is not None]
+
+    def _run(self, tasks: Sequence[Task], missing: Sequence[int]) -> Any:
+        if self.executor is None:
+            return ((i, run_task(tasks[i])) for i in missing)
+        futures = {self.executor.submit(run_task, tasks[i]): i for i in missing}
+        return ((futures[f], f.result()) for f in as_completed(futures))
+
+    def _path(self, task: Task) -> Path | None:
+        if self.cache is None:
+            return None
+        text = json.dumps([__version__, task.key()], sort_keys=True)
+        return self.cache / f"{hashlib.sha256(text.encode()).hexdigest()[:24]}.json"
+
+    def _cached(self, task: Task) -> dict[str, Any] | None:
+        path = self._path(task)
+        if path is None or not path.exists():
+            return None
+        outcome: dict[str, Any] = json.loads(path.read_text())
+        return outcome
+
+    def _keep(self, task: Task, outcome: dict[str, Any]) -> None:
+        path = self._path(task)
+        if path is None:
+            return
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part = path.with_suffix(".part")
+        part.write_text(json.dumps(outcome))
+        os.replace(part, path)

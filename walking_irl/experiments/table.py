@@ -1,0 +1,113 @@
+"""Tables of results: rows of plain values, written as Markdown, CSV and JSON."""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+import platform
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from walking_irl.report import versions, write_json
+
+COLUMNS = (
+    "setting",
+    "method",
+    "time total [s]",
+    "time in queries [s]",
+    "solves",
+    "success",
+    "final |dw|",
+    "final t_k",
+    "final interval width",
+)
+
+
+@dataclass(frozen=True)
+class Table:
+    """One table of the thesis.
+
+    Attributes:
+        name: "7.1" and so on.
+        title: What is compared, and the criterion.
+        columns: Headings.
+        rows: Cells, already text; "n/a" carries its reason in ``notes``.
+        notes: Sentences below the table.
+        header: Seeds, versions and machine.
+        raw: Outcomes behind the rows, for JSON.
+    """
+
+    name: str
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    notes: tuple[str, ...] = ()
+    header: dict[str, Any] = field(default_factory=dict)
+    raw: tuple[dict[str, Any], ...] = ()
+
+    def to_markdown(self) -> str:
+        """The table with its header and notes."""
+        lines = [f"## Table {self.name}: {self.title}", ""]
+        lines += [f"- {key}: {value}" for key, value in self.header.items()] + [""]
+        lines += ["| " + " | ".join(self.columns) + " |", "|" + " --- |" * len(self.columns)]
+        lines += ["| " + " | ".join(c.replace("|", "\\|") for c in row) + " |" for row in self.rows]
+        return "\n".join([*lines, "", *(f"- {note}" for note in self.notes), ""])
+
+    def to_csv(self) -> str:
+        """Columns and rows only."""
+        text = io.StringIO()
+        csv.writer(text, lineterminator="\n").writerows([self.columns, *self.rows])
+        return text.getvalue()
+
+    def write(self, folder: Path) -> list[Path]:
+        """Write ``table_<name>.md``, ``.csv`` and ``.json``; returns their paths."""
+        stem = folder / f"table_{self.name.replace('.', '_')}"
+        paths = [stem.with_suffix(s) for s in (".md", ".csv", ".json")]
+        _write(paths[0], self.to_markdown())
+        _write(paths[1], self.to_csv())
+        content = {k: getattr(self, k) for k in ("name", "title", "columns", "rows", "notes")}
+        write_json(paths[2], {**content, "header": self.header, "outcomes": list(self.raw)})
+        return paths
+
+
+def _write(path: Path, text: str) -> None:
+    part = path.with_name(path.name + ".part")
+    part.write_text(text)
+    os.replace(part, path)
+
+
+def machine() -> dict[str, Any]:
+    """Versions and machine, for a table's header."""
+    found = {k: v for k, v in versions().items() if k in ("walking-irl", "numpy", "scipy")}
+    return {
+        "versions": ", ".join(f"{k} {v}" for k, v in found.items()),
+        "machine": f"{platform.machine()}, {os.cpu_count()} cores, Python "
+        f"{platform.python_version()}",
+    }
+
+
+def summary(setting: str, method: str, outcomes: Sequence[dict[str, Any]]) -> tuple[str, ...]:
+    """One row of the common columns: means over seeds, solves with their standard error."""
+    solves = np.array([o["solves"] for o in outcomes], dtype=float)
+    error = solves.std(ddof=1) / np.sqrt(len(solves)) if len(solves) > 1 else float("nan")
+    return (
+        setting,
+        method,
+        _mean(outcomes, "seconds", ".3f"),
+        _mean(outcomes, "query_seconds", ".3f"),
+        f"{solves.mean():.1f} +- {error:.1f}" if len(solves) > 1 else f"{solves.mean():.1f}",
+        f"{sum(o['success'] for o in outcomes)}/{len(outcomes)}",
+        _mean(outcomes, "dw", ".3f"),
+        _mean(outcomes, "certificate", ".2e"),
+        _mean(outcomes, "width", ".3f"),
+    )
+
+
+def _mean(outcomes: Sequence[dict[str, Any]], key: str, form: str) -> str:
+    values = [o[key] for o in outcomes if o[key] is not None]
+    return format(float(np.mean(values)), form) if values else "n/a"
