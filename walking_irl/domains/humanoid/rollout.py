@@ -66,7 +66,8 @@ def rollout(
     steps, fell = _walk(env, policy, n_samples)
     if fell and raise_on_fall:
         raise _fall(walker, env, len(steps) * policy.timestep)
-    q, v, a, u, sensors = (np.array(part) for part in zip(*steps, strict=True))
+    parts = zip(*steps, strict=True)
+    q, v, a, u, sensors = (np.concatenate(part).reshape(len(steps), -1) for part in parts)
     return Rollout(policy.timestep * np.arange(len(steps), dtype=float), q, v, a, u, sensors)
 
 
