@@ -1,0 +1,51 @@
+"""The demos run without a screen and leave what they promise; the planar body makes them quick."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from walking_irl.recording.reader import Recording, inspect_recording
+
+DEMOS = Path(__file__).parents[1] / "demos"
+LONGEST = 100  # lines
+
+
+def demo(name, *argv, folder):
+    """Output of a demo that runs in an empty folder, without a screen."""
+    env = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    done = subprocess.run(
+        [sys.executable, DEMOS / name, *argv],
+        cwd=folder, env=env, capture_output=True, text=True, timeout=600,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.mark.parametrize("path", sorted(DEMOS.glob("*.py")), ids=lambda p: p.name)
+def test_demos_are_short_and_guarded(path):
+    text = path.read_text()
+    assert len(text.splitlines()) <= LONGEST
+    assert 'if __name__ == "__main__":' in text  # worker processes import the file
+
+
+@pytest.mark.slow
+def test_main_job_as_a_library_user_writes_it(tmp_path):
+    out = demo("humanoid_walking.py", "--planar", "--seed", "3", folder=tmp_path)
+    error = float(out.strip().rsplit(maxsplit=1)[-1])
+    assert "Newton" in out and error < 0.01
+    content = inspect_recording(tmp_path / "walking.rrd")
+    assert content["seed"] == 3 and content["ending"] is None
+    assert content["iterations"] == sum(" regret " in line for line in out.splitlines())
+
+
+@pytest.mark.slow
+def test_six_gaits_differ_in_what_they_were_weighed_for(tmp_path):
+    out = demo("one_gait.py", "--planar", folder=tmp_path)
+    assert "6 of 6" in out
+    assert (tmp_path / "gaits.png").read_bytes().startswith(b"\x89PNG")
+    recording = Recording(tmp_path / "gaits.rrd")
+    assert recording.has_blueprint
+    assert len(recording.column("/summary", "TextDocument:text").rows) == 6
