@@ -216,14 +216,14 @@ def whitened_volume(rows: Array) -> float:
 def _lawrence(corners: Array, seed: int) -> float:
     """Lawrence's sum over vertices given by their n rows, shape (n_vertices, n, n)."""
     n = corners.shape[1]
-    c = np.random.default_rng(seed).normal(size=n)
+    c = np.random.default_rng(seed).normal(size=(n,))
     det = np.abs(np.linalg.det(corners))
     corners, det = corners[det > 1e-300], det[det > 1e-300]
     ones: Array = np.ones((len(corners), n, 1))
     right: Array = np.tile(c[:, None], (len(corners), 1, 1))
     try:
-        v: Array = np.linalg.solve(corners, ones)
-        gamma: Array = np.linalg.solve(np.swapaxes(corners, 1, 2), right)
+        v = np.linalg.solve(corners, ones)
+        gamma = np.linalg.solve(np.swapaxes(corners, 1, 2), right)
     except np.linalg.LinAlgError:
         return -1.0
     with np.errstate(all="ignore"):
