@@ -23,8 +23,8 @@ NOTES = (
     "Solves end with the first success, or with the method's own end or budget.",
     "Time in queries is all but the forward solves; for CPIRL it includes the weight intervals of "
     "every iteration, which no rival computes.",
-    "n/a in a column: the method has no such figure (signed weights are no estimate on the simplex; "
-    "only CPIRL bounds weights).",
+    "n/a in a column: the method has no such figure (signed weights are no estimate on the "
+    "simplex; only CPIRL bounds weights).",
 )
 
 

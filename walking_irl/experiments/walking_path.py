@@ -25,9 +25,9 @@ class Config:
 
     n_intervals: int = 20
     share: float = 0.01
-    max_solves: int = 30
-    mwal_rounds: int = 40
-    seeds: int = 4
+    max_solves: int = 20
+    mwal_rounds: int = 30
+    seeds: int = 3
 
 
 def _task(config: Config, criterion: str) -> tuple[str, Task]:
