@@ -3,6 +3,7 @@ import pytest
 from scipy import sparse
 from small_mdps import random_mdp, simulated_mu
 
+from walking_irl.domains.lqr import LQR
 from walking_irl.errors import InvalidInputError, SolverError
 from walking_irl.solvers import FiniteMDP, linear_program, policy_iteration, value_iteration
 from walking_irl.solvers.riccati import closed_loop_cost, optimal_gain
@@ -111,3 +112,20 @@ def test_unstable_gain_is_refused():
     eye = np.eye(2)
     with pytest.raises(InvalidInputError, match="infinite cost"):
         closed_loop_cost(eye, eye, 0.5 * eye, eye, eye, 0.9)
+
+
+@pytest.mark.parametrize("n", [2, 3, 5])
+def test_lqr_front_equals_the_matrix_riccati_solution(n):
+    problem, eye = LQR(n), np.eye(n)
+    Q_i = problem.mixing + (1 - 2 * problem.mixing) * eye
+    rng = np.random.default_rng(n)
+    for w in rng.dirichlet(np.ones(n), 5):
+        Q, R = np.diag(w @ Q_i), np.diag(w @ (1 - Q_i))
+        k, P = optimal_gain(eye, eye, Q, R, problem.discount)
+        response = problem.forward(w)
+        np.testing.assert_allclose(np.diag(k), response.policy, rtol=1e-9)
+        x0 = np.full(n, problem.start)
+        assert w @ response.mu == pytest.approx(-x0 @ P @ x0, rel=1e-9)
+        for i in range(n):
+            cost = closed_loop_cost(eye, eye, k, np.diag(Q_i[i]), np.diag(1 - Q_i[i]), 0.9)
+            assert response.mu[i] == pytest.approx(-x0 @ cost @ x0, rel=1e-9)
