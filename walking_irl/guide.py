@@ -223,6 +223,9 @@ class Guide:
         v = self._guarded(w, step, float(f[best] * archive.scale(w)))
         if np.abs(v - w).sum() <= tol.step and not archive.is_match()[best]:
             return Decision(None, rule, step.w, Status.CONVERGED)
+        is_asked = np.abs(archive.W - v).sum(axis=1) <= tol.step
+        if bool((is_asked & archive.is_match()).any()):  # nothing beats the demonstration there
+            return Decision(None, rule, v, Status.CONVERGED)
         if self._n_poor >= 2 or archive.is_match()[best]:
             self._n_poor = 0
             return None

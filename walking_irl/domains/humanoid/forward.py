@@ -133,8 +133,8 @@ class Imitator:
         """Best gait for weights ``w`` near the demonstration."""
         solver = solver_for(self.planar, self.threads)
         seed = [int(v) for v in np.round(np.asarray(w) * 1e9)]
-        x = solver.shake(self.start, NUDGE, np.random.default_rng(seed))
-        solutions = [solver.solve(w, x, DIRECT)]
+        start = solver.shake(self.start, NUDGE, np.random.default_rng(seed))
+        solutions = [solver.solve(w, start, DIRECT)]
         better = self._better_start(w, float(solutions[0].folded @ w))
         if better is not None:
             solutions.append(solver.solve(w, better, DIRECT))
