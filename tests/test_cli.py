@@ -515,9 +515,17 @@ def test_interrupt_before_the_first_iteration(complaint, monkeypatch):
     assert "interrupted" in complaint("recover", "--domain", "lqr", code=130)
 
 
+HEARS_INTERRUPTS = """
+import signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where tests run in background
+from walking_irl.cli import main
+sys.exit(main(sys.argv[1:]))
+"""
+
+
 def start(folder, *argv):
     return subprocess.Popen(
-        [sys.executable, "-m", "walking_irl", *argv],
+        [sys.executable, "-c", HEARS_INTERRUPTS, *argv],
         cwd=folder,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
