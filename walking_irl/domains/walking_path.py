@@ -11,7 +11,7 @@ import numpy as np
 from walking_irl.domains.finite import checked_weights
 from walking_irl.domains.path_model import integrate
 from walking_irl.domains.path_solver import Path, polished, slsqp_path, straight_start
-from walking_irl.errors import InvalidInputError
+from walking_irl.errors import InvalidInputError, SolverError
 from walking_irl.types import Array, Expert, Objective, Response
 
 GOALS = ((3.0, 2.0, 90.0), (4.0, 0.0, 0.0), (2.0, 3.0, 180.0), (1.5, -2.5, -90.0))
@@ -93,8 +93,7 @@ class WalkingPath:
         """Best path to goal ``i`` for raw weights ``a``, shape (5,)."""
         goal = self.goals[i]
         starts = (straight_start(goal, self.n_intervals), self._library[i])
-        found = [slsqp_path(a, goal, z, COARSE) for z in starts]
-        coarse = min(found, key=lambda p: float(a @ p.F))
+        coarse = _best(a, goal, starts)
         path = polished(a, goal, coarse)
         if path.sensitivity is None:  # Newton's method does not apply: finish by SLSQP
             path = polished(a, goal, slsqp_path(a, goal, coarse.z))
@@ -141,6 +140,23 @@ class WalkingPath:
         times = [walk.h[0] * np.arange(walk.theta.shape[1]) for walk in walks]
         points = tuple(walk.xy[0] for walk in walks)
         return PathPicture(points, tuple(walk.theta[0] for walk in walks), tuple(times), self.goals)
+
+
+def _best(a: Array, goal: Array, starts: Sequence[Array]) -> Path:
+    """Cheapest path from any start; a start that does not arrive is dropped if another does.
+
+    Raises:
+        SolverError: If none arrives.
+    """
+    found, failure = [], SolverError("no start")
+    for z in starts:
+        try:
+            found.append(slsqp_path(a, goal, z, COARSE))
+        except SolverError as error:
+            failure = error
+    if not found:
+        raise failure
+    return min(found, key=lambda p: float(a @ p.F))
 
 
 def published_weights() -> Array:

@@ -27,6 +27,9 @@ from walking_irl.types import Array, Expert, Response
 DOMINANCE_TOL = 1e-9
 """Relative slack of "at least as good in every feature": rounding only."""
 
+FLOOR = 0.05
+"""Uniform share of the queries of projection and max-margin on the walking path."""
+
 
 @dataclass(frozen=True)
 class Task:
@@ -123,10 +126,11 @@ def run_task(task: Task) -> dict[str, Any]:
     solver = domain.solve if isinstance(domain, FiniteDomain) else domain.forward
     domain.forward(np.full(len(w_E), 1 / len(w_E)))  # warm-up: caches and imports are not timed
     clock = _Clock(solver, bool(task.arguments.get("has_newton", False)))
+    span = _span(domain, expert) if task.method == "mwal" else 0.0
     start = time.perf_counter()
     state, success, error = None, False, None
     try:
-        for state in _states(task, domain, clock, expert, rng):
+        for state in _states(task, domain, clock, expert, span, rng):
             success = _is_success(task, state.mu, w_E, expert.mu)
             if success:
                 break
@@ -154,14 +158,14 @@ def _is_success(task: Task, mu: Array, w_E: Array, mu_E: Array) -> bool:
 
 
 def _states(
-    task: Task, domain: Any, clock: _Clock, expert: Expert, rng: np.random.Generator
+    task: Task, domain: Any, clock: _Clock, expert: Expert, span: float, rng: np.random.Generator
 ) -> Iterator[State]:
     if task.method == "cpirl":
         yield from _cpirl(task, clock, expert, rng)
     elif task.method in ("utopia", "samples"):
         yield from _cutting(task, clock, expert, rng)
     else:
-        yield from _rival(task, domain, clock, expert, rng)
+        yield from _rival(task, domain, clock, expert, span, rng)
 
 
 def _cpirl(task: Task, clock: _Clock, expert: Expert, rng: np.random.Generator) -> Iterator[State]:
@@ -202,24 +206,30 @@ def _cutting(
 
 
 def _rival(
-    task: Task, domain: Any, clock: _Clock, expert: Expert, rng: np.random.Generator
+    task: Task, domain: Any, clock: _Clock, expert: Expert, span: float, rng: np.random.Generator
 ) -> Iterator[State]:
     n, signed = task.max_solves, isinstance(domain, FiniteDomain)
     if task.method == "lpal":
         run: Any = [lpal(domain, expert)]
     elif task.method == "mwal":
-        run = mwal(clock, expert, span=_span(domain, expert), max_solves=n)
+        run = mwal(clock, expert, span=span, max_solves=n)
     elif task.method == "kelley":
         run = kelley(clock, expert, max_solves=n)
     elif task.method in ("projection", "max-margin"):
         method = projection if task.method == "projection" else max_margin
-        run = method(clock, expert, rng=rng, max_solves=n, is_signed=signed)
+        oracle = _interior(clock) if isinstance(domain, WalkingPath) else clock
+        run = method(oracle, expert, rng=rng, max_solves=n, is_signed=signed)
     else:
         raise InvalidInputError(f"unknown method {task.method!r}")
     for apprentice in run:
         mu = apprentice.mu if task.scored == "mixture" else apprentice.last.mu
         w = apprentice.W[-1]
         yield State(mu, apprentice.M, w if w.min() >= 0 and task.method != "lpal" else None, None)
+
+
+def _interior(forward: Callable[[Array], Response]) -> Callable[[Array], Response]:
+    """Solver that moves weights off the simplex's faces, where accelerations stick to bounds."""
+    return lambda w: forward((1 - FLOOR) * w + FLOOR / len(w))
 
 
 def _span(domain: Any, expert: Expert) -> float:
