@@ -22,7 +22,7 @@ from walking_irl.domains.humanoid.objectives import REFERENCE_WEIGHTS
 from walking_irl.errors import FallError, SolverError
 from walking_irl.recording.reader import inspect_recording
 
-COMMANDS = ("recover", "gait", "inspect", "view", "domains")
+COMMANDS = ("recover", "gait", "tables", "inspect", "view", "domains")
 PLANAR = ("--domain", "humanoid-planar")
 RECOVER_KEYS = {
     "domain", "objectives", "centre", "mode", "seed", "w_expert", "w", "intervals",

@@ -1,4 +1,4 @@
-"""The command line: ``walking-irl recover | gait | inspect | view | domains``.
+"""The command line: ``walking-irl recover | gait | tables | inspect | view | domains``.
 
 Exit codes: 0 done, 1 the method ended without success (it says why), 2 bad input or a failed write,
 130 interrupted (what was done so far is saved).
@@ -54,6 +54,12 @@ def build_parser() -> argparse.ArgumentParser:
     sub = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     _recover_parser(sub.add_parser("recover", help="recover the hidden weights of a walker"))
     _gait_parser(sub.add_parser("gait", help="solve for the best gait under given weights"))
+    tables = sub.add_parser("tables", help="regenerate the thesis's tables 7.1 to 7.10")
+    tables.add_argument("names", nargs="+", metavar="TABLE", help="7.1 ... 7.10, fig7.1, or all")
+    tables.add_argument("--seeds", type=int, help="hidden experts per cell")
+    tables.add_argument("--out", type=Path, default=Path("tables"), help="folder (%(default)s)")
+    tables.add_argument("--quiet", action="store_true", help="print the files' names only")
+    tables.set_defaults(run="tables")
     inspect = sub.add_parser("inspect", help="print what a recording holds")
     inspect.add_argument("file", type=Path, metavar="FILE.rrd")
     inspect.add_argument("--json", type=Path, metavar="FILE.json", help="write it as JSON, too")

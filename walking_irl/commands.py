@@ -274,6 +274,23 @@ def _show_gait(content: dict[str, Any], console: Console) -> None:
     console.print(table)
 
 
+def tables(args: argparse.Namespace, console: Console) -> int:
+    """``walking-irl tables``."""
+    from walking_irl.experiments import run_tables
+
+    def progress(name: str, done: int, total: int) -> None:
+        if not args.quiet:
+            console.print(f"table {name}: {done} of {total} runs")
+
+    with workers() as executor:
+        paths = run_tables(
+            args.names, seeds=args.seeds, out=args.out, executor=executor, progress=progress
+        )
+    for path in paths:
+        console.print(escape(str(path)))
+    return 0
+
+
 def inspect(args: argparse.Namespace, console: Console) -> int:
     """``walking-irl inspect``."""
     from walking_irl.recording.reader import inspect_recording
