@@ -37,7 +37,8 @@ def assert_recovered(report, l1_error, solves):
     assert report.contains_expert
     assert report.l1_error <= l1_error
     assert report.to_json()["forward_solves"] <= solves
-    assert abs(report.relative_loss(report.recovered_mu)) < 1e-3
+    # Below zero the learner found a walk cheaper than the expert's: no search here is global.
+    assert -5e-3 < report.relative_loss(report.recovered_mu) < 1e-3
 
 
 def assert_never_cut(report):
