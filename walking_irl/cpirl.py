@@ -5,8 +5,8 @@ cuts the simplex of weights: (mu_i - mu_E).w <= 0. The next query is a centre of
 near the end, where the domain has sensitivities, a Newton step on the regret
 f(w) = max_pi w.mu(pi) - w.mu_E, which is convex and zero at w_E.
 
-Source: S. Balloccu, Cutting-Plane Inverse Reinforcement Learning (Politecnico di Milano),
-Algorithms 2 and 3.
+Source: S. Balloccu, Cutting-Plane methods for Inverse Reinforcement Learning (Politecnico di
+Milano), Algorithms 2 and 3.
 """
 
 from __future__ import annotations
