@@ -21,7 +21,7 @@ FIGURES = {
     "loss": ("loss under the hidden weights", style.EXPERT),
     "volume_ratio": ("volume left", style.POLYHEDRON),
 }
-FLOOR = 1e-12
+FLOOR = 1e-7
 """Smallest figure in the logarithmic plot."""
 
 
