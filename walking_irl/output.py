@@ -16,19 +16,33 @@ def write_file(path: Path, content: bytes) -> None:
         InvalidInputError: If the file cannot be written; what was there before is still there.
     """
     _check_name(path)
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        try:
-            with part.open("xb") as file:
-                file.write(content)
-                file.flush()
-                os.fsync(file.fileno())
-            part.replace(path)
-        except BaseException:
-            part.unlink(missing_ok=True)
-            raise
+        replace_file(path, content)
     except OSError as error:
         raise InvalidInputError(f"cannot write {path}: {error.strerror or error}") from error
+
+
+def part_of(path: Path) -> Path:
+    """Where a file of that name is written before it is complete."""
+    return path.with_name(f".{path.name}.{os.getpid()}.part")
+
+
+def replace_file(path: Path, content: bytes) -> None:
+    """Write beside ``path``, then rename: a reader sees the old file or the whole new one.
+
+    Raises:
+        OSError: If it cannot be written; nothing is left behind.
+    """
+    part = part_of(path)
+    try:
+        with part.open("xb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(path)
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
 
 
 def check_outputs(paths: Sequence[Path | None]) -> None:

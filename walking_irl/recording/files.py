@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import contextlib
-import os
 from collections.abc import Iterator
 from pathlib import Path
 
 from walking_irl.errors import RecordingError
+from walking_irl.output import part_of, replace_file
 
 
 def check_writable(path: str | Path) -> Path:
@@ -24,7 +24,7 @@ def check_writable(path: str | Path) -> Path:
     path = Path(path)
     _check_name(path)
     with _explained(path):
-        part = _part(path)
+        part = part_of(path)
         part.open("xb").close()
         part.unlink()
     return path
@@ -38,21 +38,8 @@ def write_atomically(path: str | Path, content: bytes) -> None:
     """
     path = Path(path)
     _check_name(path)
-    part = _part(path)
     with _explained(path):
-        try:
-            with part.open("xb") as file:
-                file.write(content)
-                file.flush()
-                os.fsync(file.fileno())
-            part.replace(path)
-        except BaseException:
-            part.unlink(missing_ok=True)
-            raise
-
-
-def _part(path: Path) -> Path:
-    return path.with_name(f".{path.name}.{os.getpid()}.part")
+        replace_file(path, content)
 
 
 def _check_name(path: Path) -> None:

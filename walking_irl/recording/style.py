@@ -17,7 +17,6 @@ CUT: Colour = (226, 50, 50)
 """What the newest cut took away."""
 FRAME: Colour = (150, 154, 162)
 LENS: Colour = (120, 150, 200)
-INK: Colour = (60, 64, 72)
 FORCE: Colour = (226, 88, 20)
 TRAIL: Colour = (28, 98, 190)
 PAPER: Colour = (248, 248, 246)
