@@ -6,7 +6,16 @@ from pathlib import Path
 import walking_irl
 
 ROOT = Path(walking_irl.__file__).parent
-CORE = ["halfspaces", "polyhedron", "certificates", "newton", "archive", "guide", "stopping"]
+CORE = [
+    "dual_simplex",
+    "halfspaces",
+    "polyhedron",
+    "certificates",
+    "newton",
+    "archive",
+    "guide",
+    "stopping",
+]
 UPPER = ["domains", "baselines", "recording", "experiments", "cli"]
 
 

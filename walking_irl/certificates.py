@@ -11,11 +11,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import linprog
 
 from walking_irl.centres.centre import Centre
-from walking_irl.errors import InvalidInputError, SolverError
-from walking_irl.polyhedron import WeightPolyhedron, plane_basis
+from walking_irl.dual_simplex import maximise
+from walking_irl.errors import InvalidInputError
+from walking_irl.polyhedron import WeightPolyhedron, feasible, plane_basis
 from walking_irl.types import Array
 
 
@@ -48,27 +48,23 @@ def game_lp(D: Array) -> Game:
     D = _rows(D)
     n, K = D.shape
     scale = max(float(np.abs(D).max()), 1e-300)
-    result = linprog(
-        np.r_[np.zeros(K), -1.0],
-        A_ub=np.c_[D / scale, np.ones(n)],
-        b_ub=np.zeros(n),
-        A_eq=np.r_[np.ones(K), 0.0][None],
-        b_eq=[1.0],
-        bounds=[(0.0, None)] * K + [(None, None)],
-        method="highs",
-    )
-    if result.status != 0:
-        raise SolverError(f"minimax program of {n} policies failed: {result.message}")
-    mixture = np.maximum(-np.asarray(result.ineqlin.marginals), 0.0)
-    mixture = mixture / mixture.sum()
-    w = np.maximum(result.x[:K], 0.0)
+    rows = np.r_[np.c_[D @ plane_basis(K) / scale, np.ones(n)], np.c_[-plane_basis(K), np.zeros(K)]]
+    right = np.r_[-D.mean(axis=1) / scale, np.full(K, 1.0 / K)]
+    # One policy alone is worst where its d_j is smallest: on all bounds but that one.
+    first = int(D.min(axis=1).argmax())
+    basis = np.r_[first, n + (D[first].argmin() + np.arange(1, K)) % K]
+    found = maximise(np.eye(K)[K - 1 :], rows, right, basis[None])
+    mixture = found.multipliers[0, :n] / found.multipliers[0, :n].sum()
+    w = feasible(1.0 / K + plane_basis(K) @ found.x[0, : K - 1], 0.0)
     # The mixture's own guarantee, exact whatever the solver's tolerance.
-    return Game(float(np.max(-(mixture @ D))), mixture, w / w.sum())
+    return Game(float(np.max(-(mixture @ D))), mixture, w)
 
 
 def single_policy_bounds(P: WeightPolyhedron, D: Array) -> Array:
     """U_i = max {L_i(w) : w in P} >= L_i(w_E) for each policy by itself, shape (n,)."""
-    return np.array([P.support(-d)[0] for d in _rows(D, P.n_objectives)])
+    D = _rows(D, P.n_objectives)
+    losses: Array = np.einsum("ij,ij->i", -D, P.maximisers(-D))
+    return losses
 
 
 def radius(P: WeightPolyhedron, w: Array) -> float:

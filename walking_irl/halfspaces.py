@@ -13,16 +13,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
-from scipy.optimize import linprog
+from scipy.linalg.lapack import dgels
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
+from walking_irl.dual_simplex import maximise
 from walking_irl.errors import SolverError
 from walking_irl.types import Array
 
 LAWRENCE_AGREEMENT = 1e-6
 """Relative difference of two volumes by Lawrence's formula that rounding explains."""
 FLAT_RADIUS = 1e-7
-"""Inscribed radius up to which a set counts as flat: the linear programs' own tolerance."""
+"""Inscribed radius up to which a set counts as flat: its weights are known well enough there."""
 
 
 class Ball(NamedTuple):
@@ -40,103 +41,73 @@ class BarrierCentre(NamedTuple):
     slack: Array
 
 
-def linear_program(c: Array, A: Array, b: Array) -> Array | None:
-    """Maximise c.x over A x <= b with free x.
-
-    Args:
-        c: Objective, shape (n,).
-        A: Rows, shape (m, n).
-        b: Right-hand sides, shape (m,).
-
-    Returns:
-        The maximiser, shape (n,), or None where no point satisfies the rows.
-
-    Raises:
-        SolverError: If the program is unbounded or the solver fails numerically.
-    """
-    result = None
-    for method in ("highs", "highs-ipm"):
-        result = linprog(-c, A_ub=A, b_ub=b, bounds=(None, None), method=method)
-        if result.status == 0:
-            return np.asarray(result.x, dtype=np.float64)
-        if result.status == 2:
-            return None
-    assert result is not None
-    raise SolverError(f"linear program with {len(b)} rows failed: {result.message}")
-
-
 def chebyshev_ball(A: Array, b: Array) -> Ball:
-    """Largest ball in {A z <= b}; the rows must have norm 1 and bound z.
-
-    The program is solved a second time around its first answer in units of the radius, because
-    the solver's feasibility tolerance of 1e-7 is absolute.
+    """Largest ball in {A z <= b}; the rows must have norm 1.
 
     Args:
-        A: Unit rows, shape (m, n).
+        A: Unit rows, shape (m, n); the first n + 1 of them bound a simplex.
         b: Right-hand sides, shape (m,).
 
     Returns:
         Centre, shape (n,), and radius. The centre need not be unique.
     """
     n = A.shape[1]
-    objective = np.r_[np.zeros(n), 1.0]
     lifted = np.c_[A, np.ones(len(b))]
-    z, scale = np.zeros(n), 1.0
-    for _ in range(2):
-        y = linear_program(objective, lifted, (b - A @ z) / scale)
-        assert y is not None, "every point is feasible with a negative radius"
-        z = z + scale * y[:n]
-        radius = float(np.min(b - A @ z))
-        if abs(radius) > 1e-2:
-            break
-        scale = max(abs(radius), 1e-7)
-    return Ball(z, radius)
+    z = maximise(np.eye(n + 1)[n:], lifted, b, np.arange(n + 1)[None]).x[0, :n]
+    return Ball(z, float(np.min(b - A @ z)))
 
 
-def barrier_centre(A: Array, b: Array, z: Array, max_iter: int = 200) -> BarrierCentre:
-    """Analytic centre by feasible Newton steps from a strictly interior start.
+def barrier_centre(A: Array, b: Array, z: Array, max_iter: int = 60) -> BarrierCentre:
+    """Analytic centre by Newton steps from any start (Boyd and Vandenberghe, section 10.3).
 
-    Each step is a least-squares problem in the scaled rows A/s (their QR factors), whose condition
-    number is the square root of the Hessian's.
+    The slacks y are variables of their own, so that a start may miss rows: the residual
+    r = y + A z - b shrinks by 1 - t in a step of length t and is gone after a full one. Each step
+    is a least-squares problem in the scaled rows A/y, whose condition number is the square root of
+    the Hessian's. Where the rows have no interior the steps do not end.
 
     Args:
-        A: Rows, shape (m, n).
+        A: Rows that bound z, shape (m, n).
         b: Right-hand sides, shape (m,).
-        z: Start with A z < b, shape (n,).
+        z: Start, shape (n,).
         max_iter: Bound on Newton steps; about ten are needed.
 
     Returns:
         Centre, triangular root ``R`` of the Hessian, and slacks ``b - A z``, shape (m,).
 
     Raises:
-        SolverError: If the start is not strictly inside, or Newton does not converge.
+        SolverError: If Newton does not converge to a point strictly inside.
     """
+    n = len(z)
     slack = b - A @ z
-    if slack.min() <= 0.0:
-        raise SolverError(f"start of the analytic centre misses a row by {-slack.min():.1e}")
+    y = np.where(slack > 0.0, slack, 1.0)
+    decrement = np.inf
     for _ in range(max_iter):
-        Q, R = np.linalg.qr(A / slack[:, None])
-        gradient = Q.sum(axis=0)
-        decrement = float(gradient @ gradient)
-        step = -solve_triangular(R, gradient)
-        rate = (A @ step) / slack
-        z = z + _step_length(rate, decrement) * step
+        residual = y - slack
+        is_inside = not residual.any()
+        scaled = A / y[:, None]
+        step = -dgels(scaled, 1.0 + residual / y)[1][:n]
+        move = scaled @ step
+        rate = move + residual / y
+        decrement = float(move @ move)
+        t = _step_length(rate, decrement, is_inside)
+        z = z + t * step
         slack = b - A @ z
-        if decrement <= 1e-14:
-            return BarrierCentre(z, np.linalg.qr(A / slack[:, None])[1], slack)
-    if decrement <= 1e-6:  # rounding in the slacks of a very thin set: still well centred
-        return BarrierCentre(z, R, slack)
-    raise SolverError(f"analytic centre: Newton decrement {decrement:.1e} after {max_iter} steps")
+        y = slack if is_inside or t == 1.0 else y * (1.0 - t * rate)
+        if is_inside and decrement <= 1e-14:
+            break
+    # A decrement up to 1e-6 is rounding in the slacks of a very thin set: still well centred.
+    if not decrement <= 1e-6 or not slack.min() > 0.0:
+        raise SolverError(f"analytic centre: Newton decrement {decrement:.1e}")
+    return BarrierCentre(z, np.asarray(np.linalg.qr(A / slack[:, None], mode="r")), slack)
 
 
-def _step_length(rate: Array, decrement: float) -> float:
-    """Backtracking on the barrier along a Newton step; ``rate`` is A dz / s, shape (m,)."""
-    if decrement < 0.05:  # region of quadratic convergence: the full step stays inside
-        return 1.0
+def _step_length(rate: Array, decrement: float, is_inside: bool) -> float:
+    """Step that keeps the slacks y (1 - t rate) positive and, inside, lowers the barrier."""
     fastest = float(rate.max())
-    t = min(1.0, 0.99 / fastest) if fastest > 0.0 else 1.0
-    while -np.log1p(-t * rate).sum() > -0.01 * t * decrement:
-        t *= 0.5
+    t = min(1.0, 0.95 / fastest) if fastest > 0.0 else 1.0
+    if is_inside and decrement >= 0.05:  # below: region of quadratic convergence
+        while -np.log1p(-t * rate).sum() > -0.01 * t * decrement:
+            t *= 0.5
     return t
 
 

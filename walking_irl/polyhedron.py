@@ -15,7 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
-from walking_irl.errors import EmptyPolyhedronError, FlatPolyhedronError, InvalidInputError
+from walking_irl.dual_simplex import maximise
+from walking_irl.errors import (
+    EmptyPolyhedronError,
+    FlatPolyhedronError,
+    InvalidInputError,
+    SolverError,
+)
 from walking_irl.halfspaces import (
     FLAT_RADIUS,
     Ball,
@@ -23,7 +29,6 @@ from walking_irl.halfspaces import (
     barrier_centre,
     chebyshev_ball,
     distinct_rows,
-    linear_program,
     whitened_facets,
     whitened_rows,
     whitened_vertices,
@@ -43,6 +48,13 @@ def plane_basis(n_objectives: int) -> Array:
     U: Array = np.ascontiguousarray(Q[:, 1:K])
     U.setflags(write=False)
     return U
+
+
+def feasible(w: Array, min_weight: float) -> Array:
+    """Weights with rounding clipped onto their bounds, (..., K) -> (..., K)."""
+    w = np.maximum(w, min_weight)
+    normalised: Array = w / w.sum(axis=-1, keepdims=True)
+    return normalised
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,19 +218,23 @@ class WeightPolyhedron:
         Raises:
             EmptyPolyhedronError: If the set is empty or flat.
         """
-        start = self.chebyshev().z
+        if not self.is_contradictory:
+            try:
+                centre = self._barrier_from(np.zeros(self.n_objectives - 1))
+                if float(np.min(self.b - self.A @ centre.z)) > FLAT_RADIUS:
+                    return centre  # proves the interior without a linear program
+            except SolverError:
+                pass
+        return self._barrier_from(self.chebyshev().z)
+
+    def _barrier_from(self, z: Array) -> BarrierCentre:
         is_used = np.r_[np.ones(self.n_objectives, dtype=bool), ~self.is_lazy]
         while True:
-            centre = barrier_centre(self.A[is_used], self.b[is_used], start)
+            centre = barrier_centre(self.A[is_used], self.b[is_used], z)
             slack = self.b - self.A @ centre.z
             worst = int(np.argmin(slack))
-            if slack[worst] > 0.0:
+            if slack[worst] > 0.0 or is_used[worst]:
                 return centre
-            if is_used[worst]:
-                raise FlatPolyhedronError(
-                    f"the analytic centre lies on a row (radius {self.ball.radius:.1e})",
-                    self.ball.radius,
-                )
             is_used[worst] = True
 
     @cached_property
@@ -227,10 +243,8 @@ class WeightPolyhedron:
 
     def _from_whitened(self, y: Array) -> Array:
         """Weights of whitened coordinates, clipped onto the bounds against rounding."""
-        w = self.to_weights(self.barrier.z + solve_triangular(self.barrier.R, y.T).T)
-        w = np.maximum(w, self.min_weight)
-        normalised: Array = w / w.sum(axis=-1, keepdims=True)
-        return normalised
+        z = self.barrier.z + solve_triangular(self.barrier.R, y.T).T
+        return feasible(self.to_weights(z), self.min_weight)
 
     def vertices(self) -> Array:
         """All vertices as weights, shape (n, K); exact enumeration for K <= 7.
@@ -290,26 +304,29 @@ class WeightPolyhedron:
         Raises:
             EmptyPolyhedronError: If no weight satisfies every row.
         """
-        w = self._support_point(np.asarray(c, dtype=np.float64))
+        c = np.asarray(c, dtype=np.float64)
+        w = self.maximisers(c[None])[0]
         return float(c @ w), w
 
-    def _support_point(self, c: Array) -> Array:
-        direction = c @ plane_basis(self.n_objectives)
-        if self.ball.radius > FLAT_RADIUS:
-            direction = solve_triangular(self.barrier.R, direction, trans="T")
-            norm = np.linalg.norm(direction)
-            direction = direction / norm if norm > 0.0 else direction
-            y = linear_program(direction, self._whitened, np.ones(len(self.b)))
-            assert y is not None, "the centre is feasible"
-            return self._from_whitened(y)
-        z = None
-        if self.ball.radius >= -FLAT_RADIUS:
-            z = linear_program(direction, self.A, self.b + FLAT_RADIUS)
-        if z is None:
-            raise EmptyPolyhedronError("no weight satisfies every cut", self.ball.radius)
-        w = np.maximum(self.to_weights(z), self.min_weight)
-        point: Array = w / w.sum()
-        return point
+    def maximisers(self, C: Array) -> Array:
+        """Weights that attain the largest c.w over the set for each row c; (p, K) -> (p, K).
+
+        Raises:
+            EmptyPolyhedronError: If no weight satisfies every row.
+        """
+        K = self.n_objectives
+        directions = C @ plane_basis(K)
+        # Over the simplex alone c.w is largest in a corner: on all bounds but that of the best c_j.
+        basis = (C.argmax(axis=1)[:, None] + np.arange(1, K)) % K
+        try:
+            rows = self._whitened
+        except FlatPolyhedronError:
+            z = maximise(directions, self.A, self.b + FLAT_RADIUS, basis).x
+            return feasible(self.to_weights(z), self.min_weight)
+        directions = solve_triangular(self.barrier.R, directions.T, trans="T").T
+        norm = np.linalg.norm(directions, axis=1, keepdims=True)
+        directions /= np.where(norm > 0.0, norm, 1.0)
+        return self._from_whitened(maximise(directions, rows, np.ones(len(rows)), basis).x)
 
     def intervals(self) -> Array:
         """Smallest and largest value of each weight, shape (K, 2), from 2K linear programs.
@@ -318,4 +335,6 @@ class WeightPolyhedron:
             EmptyPolyhedronError: If no weight satisfies every row.
         """
         eye = np.eye(self.n_objectives)
-        return np.array([[-self.support(-e)[0], self.support(e)[0]] for e in eye])
+        corners = self.maximisers(np.r_[-eye, eye])
+        extremes: Array = np.einsum("bjj->jb", corners.reshape(2, *eye.shape))
+        return extremes

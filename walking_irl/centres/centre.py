@@ -6,7 +6,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from walking_irl.polyhedron import WeightPolyhedron
+from walking_irl.polyhedron import WeightPolyhedron, feasible
 from walking_irl.types import Array
 
 
@@ -36,6 +36,4 @@ class CentreRule(Protocol):
 
 def feasible_weights(P: WeightPolyhedron, z: Array) -> Array:
     """Weights of plane coordinates, with rounding clipped onto the weights' bounds; shape (K,)."""
-    w = np.maximum(P.to_weights(z), P.min_weight)
-    normalised: Array = w / w.sum()
-    return normalised
+    return feasible(P.to_weights(z), P.min_weight)
