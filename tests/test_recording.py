@@ -13,8 +13,10 @@ import pytest
 import rerun as rr
 import rerun_cli
 
+from walking_irl.cpirl import cpirl
 from walking_irl.domains.humanoid.anatomy import load_walker
 from walking_irl.domains.humanoid.gait import Gait, cycle_motion
+from walking_irl.domains.lqr import LQR
 from walking_irl.errors import InvalidInputError, RecordingError
 from walking_irl.paths import model_path
 from walking_irl.polyhedron import WeightPolyhedron
@@ -27,7 +29,9 @@ from walking_irl.recording.panels import panels
 from walking_irl.recording.reader import Recording, check_recording, inspect_recording
 from walking_irl.recording.screenshot import open_viewer, save_screenshot
 from walking_irl.recording.style import PLAYBACK_RATE
+from walking_irl.recovery import summarise
 from walking_irl.types import Array, Expert, Iteration, Objective, Response, Rollout, Rule, Status
+from walking_irl.versions import versions
 
 MJCF = """
 <mujoco><option timestep="0.01"/>
@@ -67,7 +71,8 @@ def walk(stride: float = STRIDE, cycle: float = CYCLE, n: int = 40) -> Rollout:
 
 
 def objectives(K: int) -> list[Objective]:
-    return [Objective(f"part {j}", "1", 1.0, f"Meaning {j}.") for j in range(K)]
+    """Named, with units and scales of their own."""
+    return [Objective(f"part {j}", f"m^{j}", 1.0 + j, f"Meaning {j}.") for j in range(K)]
 
 
 def run(K: int, n: int = 4, seed: int = 0) -> tuple[Experiment, list[Iteration]]:
@@ -198,6 +203,43 @@ def test_properties_and_inspection(recorded: Recording) -> None:
     assert (found["iterations"], found["frames"]) == (4, FRAMES)
     assert (found["status"], found["ending"]) == ("budget", None)
     assert found["versions"]["mujoco"] == mujoco.__version__
+    assert "python" in found["versions"] and found["versions"] == versions()
+
+
+def test_how_sure_a_recovery_is_is_read_back_and_told(recorded: Recording) -> None:
+    experiment, iterations = run(6)
+    found = inspect_recording(recorded.path)
+    expected = summarise(iterations, experiment.expert, experiment.objectives)
+    physical = iterations[-1].intervals / np.arange(1.0, 7.0)[:, None]
+    np.testing.assert_allclose(found["physical_intervals"], physical)
+    assert found["units"] == [f"m^{j}" for j in range(6)]
+    assert found["rule"] == expected.rule and expected.rule in recorded.summary
+    last = iterations[-1]
+    np.testing.assert_allclose(found["bracket"], [-last.certificate, last.best_regret])
+    assert found["volume_ratio"] == pytest.approx(expected.volume_ratio)
+    assert 0.0 < found["volume_ratio"] < 1.0
+    assert f"{expected.volume_ratio:.1e} is left" in recorded.summary
+    np.testing.assert_array_equal(found["noise"], np.zeros(6))
+    assert found["condition_number"] is None and found["weakest"] is None  # no sensitivity known
+    low, high = physical[5]
+    assert f"| {low:.3g} - {high:.3g} per m^5 |" in recorded.summary
+
+
+def test_weakest_direction_and_noise_are_told_where_they_are_known(tmp_path: Path) -> None:
+    problem, w_E = LQR(3), np.array([0.2, 0.3, 0.5])
+    mu = problem.forward(w_E).mu
+    expert = Expert(mu, 0.02 * np.abs(mu), n_samples=7)
+    experiment = Experiment("lqr", problem.objectives, expert, w_expert=w_E)
+    iterations = list(cpirl(problem.forward, expert, rng=np.random.default_rng(0), max_solves=3))
+    with Recorder(tmp_path / "a.rrd", experiment) as recorder:
+        for it in iterations:
+            recorder.iteration(it)
+    found, text = inspect_recording(tmp_path / "a.rrd"), Recording(tmp_path / "a.rrd").summary
+    expected = summarise(iterations, expert, problem.objectives)
+    assert found["condition_number"] == pytest.approx(expected.condition_number)
+    assert found["weakest"] == expected.weakest and f"**{expected.weakest}**" in text
+    np.testing.assert_allclose(found["noise"], expert.error)
+    assert "known from 7 recorded walks to within 2 % each" in text
 
 
 def test_summary_tells_hidden_and_recovered_weights(recorded: Recording) -> None:

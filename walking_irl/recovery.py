@@ -21,6 +21,7 @@ class Recovery:
         w: Representative weights, shape (K,).
         rule: How they were chosen, in words.
         intervals: Per-weight bounds, shape (K, 2), relative to the policies evaluated.
+        physical_intervals: The same per raw unit of each cost, w_j / scale_j [1/unit], (K, 2).
         certificate: Some mixture of the policies found loses at most this much to the expert.
         bracket: (-t_k, best regret): bounds on the least regret of any weights; 0 inside means
             that the expert may be optimal.
@@ -35,6 +36,7 @@ class Recovery:
     w: Array
     rule: str
     intervals: Array
+    physical_intervals: Array
     certificate: float
     bracket: tuple[float, float]
     volume_ratio: float
@@ -53,7 +55,7 @@ def summarise(
     Args:
         iterations: All that :func:`~walking_irl.cpirl.cpirl` yielded, at least one.
         expert: The expert it was given.
-        objectives: For names in words; numbered where missing.
+        objectives: For names in words and scales; numbered, of scale 1, where missing.
 
     Raises:
         InvalidInputError: If there is no iteration.
@@ -63,6 +65,7 @@ def summarise(
     last = iterations[-1]
     K = len(last.w)
     names = [o.name for o in objectives] or [f"objective {i + 1}" for i in range(K)]
+    scales = np.array([o.scale for o in objectives] or np.ones(K))
     condition, weakest = _identifiability(iterations, names)
     whole = WeightPolyhedron.simplex(K, last.polyhedron.min_weight)
     return Recovery(
@@ -73,6 +76,7 @@ def summarise(
             else "Newton step from the best query where it applies"
         ),
         intervals=last.intervals,
+        physical_intervals=last.intervals / scales[:, None],
         certificate=last.certificate,
         bracket=(-last.certificate, last.best_regret),
         volume_ratio=last.polyhedron.volume() / whole.volume(),
@@ -97,4 +101,5 @@ def _identifiability(
     direction = plane_basis(len(names)) @ vectors[:, 0]
     direction = direction * np.sign(direction[np.argmax(np.abs(direction))])
     for_, against = int(np.argmax(direction)), int(np.argmin(direction))
-    return float(values[-1] / values[0]), f"{names[for_]} against {names[against]}"
+    condition = float(values[-1] / values[0]) if values[0] > 0.0 else np.inf
+    return condition, f"{names[for_]} against {names[against]}"

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import dataclass, field
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ from walking_irl.errors import InvalidInputError, RecordingError
 from walking_irl.output import write_file
 from walking_irl.recovery import Recovery, summarise
 from walking_irl.types import Array, Expert, Iteration, Objective, Rule, Status
+from walking_irl.versions import versions
 
 SUCCESS = (
     Status.MATCHED,
@@ -25,18 +25,6 @@ SUCCESS = (
 )
 """Endings that answer the question; any other leaves exit code 1."""
 INTERRUPTED = "interrupted"
-PACKAGES = ("walking-irl", "mujoco", "dm-control", "numpy", "scipy", "cvxpy", "rerun-sdk")
-
-
-def versions() -> dict[str, str]:
-    """Versions of this package and of those that decide its results."""
-    out = {}
-    for name in PACKAGES:
-        try:
-            out[name] = version(name)
-        except PackageNotFoundError:
-            out[name] = "not installed"
-    return out
 
 
 @dataclass
@@ -173,6 +161,7 @@ def _summary(r: Recovery) -> dict[str, Any]:
     return {
         "rule": r.rule,
         "bracket": list(r.bracket),
+        "physical_intervals": r.physical_intervals.tolist(),
         "volume_ratio": r.volume_ratio,
         "condition_number": r.condition_number,
         "weakest": r.weakest,

@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from walking_irl.report import versions, write_json
+from walking_irl.report import write_json
+from walking_irl.versions import versions
 
 COLUMNS = (
     "setting",

@@ -116,7 +116,10 @@ class Recording:
                 yield chunk.to_record_batch()
 
 
-SINGLE = ("domain", "centre", "mode", "seed", "iterations", "ending", "status", "certificate")
+SINGLE = (
+    *("domain", "centre", "mode", "seed", "iterations", "ending", "status", "certificate"),
+    *("rule", "volume_ratio", "condition_number", "weakest"),
+)
 """Properties that are one value."""
 
 
@@ -129,24 +132,25 @@ def inspect_recording(path: str | Path) -> dict[str, Any]:
     """What a recording holds, ready for JSON.
 
     Returns:
-        application_id, domain, objectives, centre, mode, seed, w_expert (or None), w, intervals
-        (K, 2), status, ending (None for a whole run), certificate, iterations, frames,
-        entities, timelines, has_blueprint, versions.
+        application_id, domain, objectives, units, centre, mode, seed, w_expert (or None), w, rule,
+        intervals (K, 2), physical_intervals (K, 2), status, ending (None for a whole run),
+        certificate, bracket, volume_ratio, condition_number, weakest, noise, iterations, frames,
+        entities, timelines, has_blueprint, versions. What is not known is None.
 
     Raises:
         RecordingError: If the file is missing, no recording, truncated, or of another program.
     """
     recording = Recording(path)
     known = recording.properties
-    intervals = known.get("intervals")
-    frames = _n_frames(recording)
-    keys = ("domain", "objectives", "centre", "mode", "seed", "w_expert", "w", "status", "ending",
-            "certificate", "iterations")  # fmt: skip
+    pairs = {key: known.get(key) for key in ("intervals", "physical_intervals")}
+    keys = ("domain", "objectives", "units", "centre", "mode", "seed", "w_expert", "w", "rule",
+            "status", "ending", "certificate", "bracket", "volume_ratio", "condition_number",
+            "weakest", "noise", "iterations")  # fmt: skip
     return {
         "application_id": APPLICATION_ID,
         **{key: known.get(key) for key in keys},
-        "intervals": None if intervals is None else np.reshape(intervals, (-1, 2)).tolist(),
-        "frames": frames,
+        **{k: None if v is None else np.reshape(v, (-1, 2)).tolist() for k, v in pairs.items()},
+        "frames": _n_frames(recording),
         "entities": recording.entities,
         "timelines": recording.timelines,
         "has_blueprint": recording.has_blueprint,

@@ -2,31 +2,25 @@
 
 from __future__ import annotations
 
-import platform
-from importlib.metadata import version
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from walking_irl.recording.experiment import Experiment
-from walking_irl.types import Iteration
-
-PACKAGES = ("walking-irl", "rerun-sdk", "mujoco", "numpy", "scipy")
-
-
-def versions() -> dict[str, str]:
-    """Versions of what made the recording."""
-    return {"python": platform.python_version()} | {name: version(name) for name in PACKAGES}
+from walking_irl.recovery import Recovery
+from walking_irl.types import Expert
+from walking_irl.versions import versions
 
 
 def summary(
-    experiment: Experiment, last: Iteration | None, world: str, ending: str | None = None
+    experiment: Experiment, found: Recovery | None, world: str, ending: str | None = None
 ) -> str:
-    """Markdown: what is shown, hidden and recovered weights, how to read it.
+    """Markdown: what is shown, hidden and recovered weights, how sure they are, how to read it.
 
     Args:
         experiment: The run.
-        last: Its last iteration so far.
+        found: What it found so far, or None before its first iteration.
         world: What the world's view shows.
         ending: Why the run was cut short, or None.
     """
@@ -34,28 +28,71 @@ def summary(
              else f"# What does the expert of {experiment.domain} want?"]  # fmt: skip
     if ending is not None:
         parts.append(f"**The run was cut short: {ending}.** What was done until then is here.")
-    if last is not None:
-        parts += [_result(experiment, last), _table(experiment, last)]
+    if found is not None:
+        parts += [_result(experiment, found), _table(experiment, found)]
     parts += ["## How to read it", _legend(experiment, world)]
+    if found is not None:
+        parts += ["## How sure it is", _certainty(experiment, found)]
+    parts += ["## Objectives", "\n".join(f"* {o.name}: {o.meaning}" for o in experiment.objectives)]
     return "\n\n".join(parts)
 
 
-def _result(experiment: Experiment, last: Iteration) -> str:
-    text = f"**{last.k + 1} iterations**: {last.status.value}."
+def _result(experiment: Experiment, found: Recovery) -> str:
+    text = f"**{found.n_solves} iterations**: {found.status.value}."
     if experiment.w_expert is not None:
-        l1 = float(np.abs(last.estimate - experiment.w_expert).sum())
+        l1 = float(np.abs(found.w - experiment.w_expert).sum())
         text += f" Hidden weights recovered to {l1:.4f} (sum of absolute errors)."
     return text
 
 
-def _table(experiment: Experiment, last: Iteration) -> str:
+def _table(experiment: Experiment, found: Recovery) -> str:
     hidden = experiment.w_expert
-    rows = ["| objective | hidden | recovered | interval |", "|---|---|---|---|"]
-    for j, name in enumerate(experiment.names):
+    rows = ["| objective | hidden | recovered | interval | per raw unit |", "|---|---|---|---|---|"]
+    for j, objective in enumerate(experiment.objectives):
         truth = "?" if hidden is None else f"{hidden[j]:.4f}"
-        low, high = last.intervals[j]
-        rows.append(f"| {name} | {truth} | {last.estimate[j]:.4f} | {low:.4f} - {high:.4f} |")
+        low, high = found.intervals[j]
+        rows.append(
+            f"| {objective.name} | {truth} | {found.w[j]:.4f} | {low:.4f} - {high:.4f} "
+            f"| {per_unit(found.physical_intervals[j], objective.unit)} |"
+        )
     return "\n".join(rows)
+
+
+def per_unit(interval: Sequence[float], unit: str) -> str:
+    """An interval of a weight per raw unit of its cost, in words.
+
+    >>> per_unit((0.25, 0.5), "m^2/s^3"), per_unit((1.0, 1.0), "rad^2 s"), per_unit((0.0, 1.0), "1")
+    ('0.25 - 0.5 per m^2/s^3', '1 - 1 per (rad^2 s)', '0 - 1')
+    """
+    low, high = interval
+    unit = f"({unit})" if " " in unit else unit
+    return f"{low:.3g} - {high:.3g}" + ("" if unit == "1" else f" per {unit}")
+
+
+def _certainty(experiment: Experiment, found: Recovery) -> str:
+    low, high = found.bracket
+    lines = [
+        f"The weights shown: {found.rule}.",
+        f"The least regret of any weights lies between {low:.1e} and {high:.1e}; "
+        "an expert that is optimal for some weights needs 0 in between.",
+        f"Of the volume of all weights {found.volume_ratio:.1e} is left.",
+    ]
+    if found.weakest is not None:
+        lines.append(
+            f"The behaviour tells least about **{found.weakest}** (condition number "
+            f"{found.condition_number:.3g})."
+        )
+    lines.append(noise_level(experiment.expert))
+    return "\n".join(f"* {text}" for text in lines)
+
+
+def noise_level(expert: Expert) -> str:
+    """How well the expert's features are known, in words."""
+    if not np.any(expert.error):
+        return "The expert's features are known exactly."
+    relative = 100 * np.max(expert.error / np.maximum(np.abs(expert.mu), 1e-300))
+    walks = f" from {expert.n_samples} recorded walks" if expert.n_samples else ""
+    return f"The expert's features are known{walks} to within {relative:.2g} % each."
 
 
 def _legend(experiment: Experiment, world: str) -> str:
@@ -69,30 +106,37 @@ def _legend(experiment: Experiment, world: str) -> str:
         "* **Certificate**: no matter which weights are true, a mixture of the policies found "
         "loses at most this much.",
     ]
-    meanings = [f"* {o.name}: {o.meaning}" for o in experiment.objectives]
-    return "\n".join([text for text in lines if text] + ["", "## Objectives", ""] + meanings)
+    return "\n".join(text for text in lines if text)
 
 
 def properties(
-    experiment: Experiment, last: Iteration | None, n_iterations: int, ending: str | None
+    experiment: Experiment, found: Recovery | None, ending: str | None
 ) -> dict[str, Any]:
     """Values of the property ``experiment``; what is not known is left out."""
     known: dict[str, Any] = {
         "domain": experiment.domain,
         "objectives": experiment.names,
+        "units": [o.unit for o in experiment.objectives],
         "centre": experiment.centre,
         "mode": experiment.mode,
         "seed": experiment.seed,
         "w_expert": experiment.w_expert,
-        "iterations": n_iterations,
+        "noise": experiment.expert.error,
+        "iterations": 0 if found is None else found.n_solves,
         "ending": ending,
         "versions": [f"{name} {number}" for name, number in versions().items()],
     }
-    if last is not None:
+    if found is not None:
         known |= {
-            "w": last.estimate,
-            "intervals": last.intervals.ravel(),
-            "status": last.status.name.lower(),
-            "certificate": last.certificate,
+            "w": found.w,
+            "rule": found.rule,
+            "intervals": found.intervals.ravel(),
+            "physical_intervals": found.physical_intervals.ravel(),
+            "status": found.status.name.lower(),
+            "certificate": found.certificate,
+            "bracket": found.bracket,
+            "volume_ratio": found.volume_ratio,
+            "condition_number": found.condition_number,
+            "weakest": found.weakest,
         }
     return {key: value for key, value in known.items() if value is not None}

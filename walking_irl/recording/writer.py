@@ -17,6 +17,7 @@ from walking_irl.recording.progress_view import ProgressView
 from walking_irl.recording.style import PLAYBACK_RATE
 from walking_irl.recording.summary import properties, summary
 from walking_irl.recording.world import WorldView
+from walking_irl.recovery import summarise
 from walking_irl.types import Iteration
 
 APPLICATION_ID = "walking_irl"
@@ -68,8 +69,7 @@ class Recorder(Generic[Motion]):
         self.world = world
         self._polyhedron = PolyhedronView(experiment)
         self._progress = ProgressView(experiment)
-        self._last: Iteration | None = None
-        self._n_iterations = 0
+        self._iterations: list[Iteration] = []
         self._n_frames = 0
 
     def __enter__(self) -> Self:
@@ -88,12 +88,12 @@ class Recorder(Generic[Motion]):
         clock = Clock(self._n_frames, it.k)
         self._progress.log_iteration(self._stream, clock, it)
         self._polyhedron.log_iteration(self._stream, clock, it)
-        self._last, self._n_iterations = it, self._n_iterations + 1
+        self._iterations.append(it)
         self._play(clock, motion, is_last=False)
 
     def finale(self, motion: Motion) -> None:
         """Show the motion of the recovered weights, for longer, as part of the last iteration."""
-        k = 0 if self._last is None else self._last.k
+        k = self._iterations[-1].k if self._iterations else 0
         self._play(Clock(self._n_frames, k), motion, is_last=True)
 
     def __exit__(
@@ -119,11 +119,14 @@ class Recorder(Generic[Motion]):
 
     def _save(self, ending: str | None) -> None:
         world = "" if self.world is None else self.world.describe()
-        text = summary(self.experiment, self._last, world, ending)
+        e, found = self.experiment, None
+        if self._iterations:
+            found = summarise(self._iterations, e.expert, e.objectives)
+        text = summary(e, found, world, ending)
         markdown = rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)
         self._stream.log("summary", markdown, static=True)
-        values = properties(self.experiment, self._last, self._n_iterations, ending)
-        self._stream.send_property("experiment", rr.AnyValues(**values))
+        values = rr.AnyValues(**properties(e, found, ending))
+        self._stream.send_property("experiment", values)
         write_atomically(self.path, self._memory.drain_as_bytes())
 
 
