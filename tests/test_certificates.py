@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 from problems import TWO_POLICIES, polyhedron_around, random_menu
+from scipy.optimize import linprog
 
 from walking_irl import certificates as cert
 from walking_irl.centres import CENTRES
@@ -57,15 +58,57 @@ def test_ellipsoids_bracket_losses_intervals_and_diameter(name):
     assert diameter <= high + 1e-9
 
 
-def test_sign_of_the_certificate_tells_interior_from_empty():
+@pytest.mark.parametrize("K", [2, 3, 6, 12])
+def test_certificate_over_the_simplex_equals_that_over_the_polyhedron(K):
+    rng = np.random.default_rng(K)
+    before = np.inf
+    w_E = rng.dirichlet(np.ones(K))
+    D = rng.standard_normal((4 * K, K))
+    D -= np.maximum(D @ w_E, 0.0)[:, None]  # as of an expert that is optimal for w_E
+    for n in (1, K, 4 * K):
+        P = WeightPolyhedron.simplex(K).cut_all(D[:n])
+        game = cert.game_lp(D[:n])
+        oracle = linprog(
+            np.r_[np.zeros(K), -1.0],
+            A_ub=np.r_[np.c_[D[:n], np.ones(n)], np.c_[P.cuts, np.zeros(len(P.cuts))]],
+            b_ub=np.zeros(n + len(P.cuts)),
+            A_eq=np.r_[np.ones(K), 0.0][None],
+            b_eq=[1.0],
+            bounds=[(0.0, None)] * K + [(None, None)],
+        )
+        assert game.value == pytest.approx(-oracle.fun, abs=1e-7)
+        assert np.min(-D[:n] @ game.w) == pytest.approx(game.value, abs=1e-9)
+        assert P.contains(game.w, 1e-9)
+        assert game.value <= before + 1e-9
+        before = game.value
+
+
+def test_sign_of_the_certificate_tells_interior_from_flat_from_empty():
     rng = np.random.default_rng(0)
-    seen = set()
-    for _ in range(100):
-        D = rng.standard_normal((4, 3)) - 0.1
-        t, r = cert.game_lp(D).value, WeightPolyhedron.simplex(3).cut_all(D).ball.radius
-        assert (t > 0) == (r > 0)
-        seen.add(t > 0)
-    assert seen == {True, False}
+    seen = {"interior": 0, "flat": 0, "empty": 0}
+    for i in range(300):
+        K = int(rng.integers(2, 7))
+        D = rng.standard_normal((2 * K, K)) - 0.1
+        if i % 3 == 0:  # two policies on either side of the expert, the rest worse than it is
+            w = rng.dirichlet(np.ones(K))
+            D -= np.maximum(D @ w, 0.0)[:, None]
+            d = rng.standard_normal(K)
+            d -= d @ w
+            D = np.r_[D, [d, -d]]
+        game, P = cert.game_lp(D), WeightPolyhedron.simplex(K).cut_all(D)
+        mixed = game.mixture @ D
+        if P.is_flat:
+            seen["flat"] += 1
+            assert abs(game.value) <= 1e-9
+            assert mixed.min() >= -1e-9, "a mixture is nowhere worse than the expert"
+        elif P.ball.radius > 0.0:
+            seen["interior"] += 1
+            assert game.value > 1e-7
+        else:
+            seen["empty"] += 1
+            assert game.value < -1e-7
+            assert mixed.min() > 0.0, "a mixture beats the expert in every feature"
+    assert min(seen.values()) >= 20, seen
 
 
 def test_two_policies_mix_to_dominate_their_counterexample():

@@ -25,6 +25,9 @@ LAWRENCE_AGREEMENT = 1e-6
 FLAT_RADIUS = 1e-7
 """Inscribed radius up to which a set counts as flat: its weights are known well enough there."""
 
+SMALLEST_SLACK = 1e-14
+"""A smaller slack, of rows with norm 1, is rounding."""
+
 
 class Ball(NamedTuple):
     """Largest inscribed ball; a negative radius says by how much the rows miss each other."""
@@ -75,7 +78,8 @@ def barrier_centre(A: Array, b: Array, z: Array, max_iter: int = 60) -> BarrierC
         Centre, triangular root ``R`` of the Hessian, and slacks ``b - A z``, shape (m,).
 
     Raises:
-        SolverError: If Newton does not converge to a point strictly inside.
+        SolverError: If Newton does not converge to a point strictly inside; as a rule because
+            there is none.
     """
     n = len(z)
     slack = b - A @ z
@@ -93,10 +97,10 @@ def barrier_centre(A: Array, b: Array, z: Array, max_iter: int = 60) -> BarrierC
         z = z + t * step
         slack = b - A @ z
         y = slack if is_inside or t == 1.0 else y * (1.0 - t * rate)
-        if is_inside and decrement <= 1e-14:
+        if is_inside and decrement <= 1e-14 or y.min() < SMALLEST_SLACK:
             break
     # A decrement up to 1e-6 is rounding in the slacks of a very thin set: still well centred.
-    if not decrement <= 1e-6 or not slack.min() > 0.0:
+    if not decrement <= 1e-6 or slack.min() < SMALLEST_SLACK:
         raise SolverError(f"analytic centre: Newton decrement {decrement:.1e}")
     return BarrierCentre(z, np.asarray(np.linalg.qr(A / slack[:, None], mode="r")), slack)
 

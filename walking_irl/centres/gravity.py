@@ -86,17 +86,17 @@ def hit_and_run(rows: Array, n_samples: int, rng: np.random.Generator, n_chains:
     """
     n = rows.shape[1]
     burn_in, n_rounds = 10 * n * n, -(-n_samples // n_chains)
-    y = np.zeros((n_chains, n))
+    y, slack = np.zeros((n_chains, n)), np.ones((n_chains, len(rows)))
     samples = np.empty((n_rounds, n_chains, n))
     for step in range(burn_in + n_rounds * n):
         direction = rng.standard_normal((n_chains, n))
-        slack, rate = 1.0 - y @ rows.T, direction @ rows.T
-        with np.errstate(divide="ignore", invalid="ignore"):
-            reach = slack / rate
-        upper = np.min(np.where(rate > 0.0, reach, np.inf), axis=1)
-        lower = np.max(np.where(rate < 0.0, reach, -np.inf), axis=1)
-        t = lower + (upper - lower) * rng.random(n_chains)
-        y = y + t[:, None] * direction
+        rate = direction @ rows.T
+        speed = rate / slack  # its largest value: of the row met first
+        lower, upper = 1.0 / speed.min(axis=1), 1.0 / speed.max(axis=1)
+        t = (lower + (upper - lower) * rng.random(n_chains))[:, None]
+        y += t * direction
+        slack -= t * rate
         if step >= burn_in and (step - burn_in) % n == 0:
             samples[(step - burn_in) // n] = y
+            slack = 1.0 - y @ rows.T  # without the rounding of the steps
     return samples.reshape(-1, n)
