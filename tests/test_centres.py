@@ -10,7 +10,7 @@ from problems import polyhedron_around
 from walking_irl.centres import CENTRES, centre_rule
 from walking_irl.centres.chebyshev import chebyshev
 from walking_irl.centres.ellipsoid import cvxpy_ellipsoid, inscribed_ellipsoid
-from walking_irl.centres.gravity import gravity
+from walking_irl.centres.gravity import gravity, hit_and_run
 from walking_irl.errors import (
     EmptyPolyhedronError,
     FlatPolyhedronError,
@@ -133,6 +133,22 @@ def test_gruenbaum_bound_on_the_volume(K):
         w = gravity(P, rng=rng).w
         d = rng.standard_normal(K)
         assert P.cut(d - d @ w).volume() <= P.volume() * (1 - (n / K) ** n) * (1 + 1e-6)
+
+
+def test_samples_have_the_moments_of_the_triangulated_set():
+    rng = np.random.default_rng(0)
+    for _ in range(3):
+        P, _ = polyhedron_around(rng, 5, 8, 0.2)
+        exact = gravity(P, rng=rng)
+        rows = whitened_rows(P.A, P.barrier, P.b)
+        y = hit_and_run(rows, 20_000, rng)
+        assert (y @ rows.T).max() < 1.0
+        z = P.barrier.z + np.linalg.solve(P.barrier.R, y.T).T
+        root = np.linalg.cholesky(exact.shape)
+        unit = np.linalg.solve(root, (z - exact.z).T)
+        # Four standard errors of independent samples, twice over because they are not.
+        assert np.abs(unit.mean(axis=1)).max() <= 8 / np.sqrt(20_000)
+        np.testing.assert_allclose(np.cov(unit), np.eye(4), atol=0.08)
 
 
 @pytest.mark.parametrize("K", [6, 7])
