@@ -68,7 +68,7 @@ def humanoid_case(domain: Humanoid, setup: Setup, executor: Executor | None) -> 
         from walking_irl.recording.gait_view import WalkerView
 
         case.world = WalkerView(domain.walker.model, one_cycle(domain, gait))
-        case.motion = lambda policy: one_cycle(domain, policy)
+        case.motion = lambda policy, w: one_cycle(domain, policy)
     return case
 
 

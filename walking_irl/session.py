@@ -94,7 +94,7 @@ class Case:
         w_expert: Hidden weights, or None.
         true_mu: Features of the expert's own policy without noise, or None.
         world: What a recording shows beside the polyhedron, or None.
-        motion: Maps a policy to what the world shows of it.
+        motion: Maps a policy, and the weights it is the best for, to what the world shows of it.
         trajectories: What was recorded of the expert.
         watch: Hands the learner's solver a function of its iteration and cost.
     """
@@ -107,7 +107,7 @@ class Case:
     w_expert: Array | None = None
     true_mu: Array | None = None
     world: Any = None
-    motion: Callable[[Any], Any] = field(default=lambda policy: None)
+    motion: Callable[[Any, Array], Any] = field(default=lambda policy, w: None)
     trajectories: tuple[Rollout, ...] = ()
     watch: Callable[[Callable[[int, float], None]], None] = field(default=lambda f: None)
 
@@ -171,7 +171,12 @@ def prepare(setup: Setup, executor: Executor | None) -> Case:
         expert = domain.suboptimal_expert(w_E, rng)
     else:
         raise InvalidInputError(f"domain {setup.domain} has no suboptimal expert")
-    return Case(domain, expert, domain.forward, w_expert=w_E, true_mu=expert.mu)
+    case = Case(domain, expert, domain.forward, w_expert=w_E, true_mu=expert.mu)
+    if setup.record is not None:
+        from walking_irl.recording.worlds import world_of
+
+        case.world, case.motion = world_of(setup.domain, domain, expert.demonstration, w_E)
+    return case
 
 
 def _given(setup: Setup, n: int) -> Array:
@@ -340,14 +345,14 @@ def _learn(
             on_iteration(it, report)
             if recorder is not None:
                 with watch.part("recording"):
-                    recorder.iteration(it, case.motion(it.response.policy))
+                    recorder.iteration(it, case.motion(it.response.policy, it.w))
             start = time.perf_counter()
         if recorder is not None and case.world is not None:
             with watch.part("recording"):
-                recorder.finale(case.motion(_best_policy(report)))
+                best = _nearest(report)
+                recorder.finale(case.motion(best.response.policy, best.w))
 
 
-def _best_policy(report: Report) -> Any:
-    """Policy of the query nearest to the recovered weights."""
-    nearest = min(report.iterations, key=lambda it: float(np.abs(it.w - report.w).sum()))
-    return nearest.response.policy
+def _nearest(report: Report) -> Iteration:
+    """The query nearest to the recovered weights."""
+    return min(report.iterations, key=lambda it: float(np.abs(it.w - report.w).sum()))

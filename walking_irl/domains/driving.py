@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 from walking_irl.domains.finite import FiniteDomain
@@ -44,10 +45,29 @@ class DrivingPicture(NamedTuple):
     """Centre (x, y) of the other car, shape (T, 2)."""
     speed: Array
     """Speed 0, 1 or 2, shape (T,)."""
+    advance: Array
+    """How far the other car comes in the next step [px], shape (T,)."""
     car: Array
     """Width and length of a car, shape (2,)."""
     road: Array
     """Left and right edge of the road, shape (2,)."""
+    lanes: Array
+    """Centre of each lane, shape (n,)."""
+    sides: Array
+    """Leftmost and rightmost position of the driven car, shape (2,)."""
+
+    @property
+    def is_colliding(self) -> NDArray[np.bool_]:
+        """Whether the two cars overlap, shape (T,)."""
+        is_near: NDArray[np.bool_] = np.abs(self.blue - self.red) < self.car
+        return np.asarray(is_near.all(axis=1))
+
+    @property
+    def is_off_road(self) -> NDArray[np.bool_]:
+        """Whether the driven car is beyond an edge of the road, shape (T,)."""
+        half = self.car[0] / 2
+        x = self.blue[:, 0]
+        return np.asarray((x - half < self.road[0]) | (x + half > self.road[1]))
 
 
 class Driving(FiniteDomain):
@@ -82,7 +102,14 @@ class Driving(FiniteDomain):
         edges = np.array([ROAD[0] - WIDTH / 2, ROAD[1] + WIDTH / 2])
         size = np.array([WIDTH, LENGTH], dtype=float)
         return DrivingPicture(
-            blue.astype(float), red.astype(float), speed.astype(float), size, edges
+            blue.astype(float),
+            red.astype(float),
+            speed.astype(float),
+            ADVANCE[speed].astype(float),
+            size,
+            edges,
+            LANES.astype(float),
+            POSITIONS[[0, -1]].astype(float),
         )
 
 

@@ -8,6 +8,7 @@ section 7.2; closed form by one scalar Riccati equation per axis.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +17,15 @@ from walking_irl.types import Array, Expert, Objective, Response
 
 SPOILT_BY = 0.25
 """Relative error of a sub-optimal expert's gains."""
+
+
+class LQRPicture(NamedTuple):
+    """A trajectory of every axis from the start, without noise."""
+
+    states: Array
+    """Shape (T + 1, K)."""
+    inputs: Array
+    """Shape (T, K)."""
 
 
 @dataclass(frozen=True)
@@ -107,3 +117,9 @@ class LQR:
     def suboptimal_expert(self, w_E: Array, rng: np.random.Generator) -> Expert:
         """Expert with gains up to 25 % off, if this domain perturbs none already."""
         return replace(self, perturbation=self.perturbation or SPOILT_BY).expert(w_E, rng)
+
+    def picture(self, policy: Array, n_steps: int = 16) -> LQRPicture:
+        """``n_steps`` steps under gains ``policy``, shape (K,)."""
+        k = np.asarray(policy, dtype=np.float64)
+        states = self.start * (1 + k) ** np.arange(n_steps + 1.0)[:, None]
+        return LQRPicture(states, k * states[:-1])

@@ -28,7 +28,7 @@ def blueprint(experiment: Experiment, world: WorldView[Any] | None) -> rrb.Bluep
             rrb.TextDocumentView(origin="/summary", name="What to look at"),
             rrb.TextLogView(origin="/log", name="Log"),
             _plots("Features", [f"/{feature_path(name)}" for name in experiment.names]),
-            *([] if world is None else [_plots("Joints [deg]", world.curves())]),
+            *([] if world is None else [_plots(world.curves_name, world.curves())]),
             active_tab=0,
         ),
         column_shares=[1.15, 1.0, 1.0],
@@ -40,7 +40,7 @@ def blueprint(experiment: Experiment, world: WorldView[Any] | None) -> rrb.Bluep
 def motion_blueprint(world: WorldView[Any]) -> rrb.Blueprint:
     """One motion alone: the world, and beside it the text and the joints."""
     text = rrb.TextDocumentView(origin="/summary", name="Summary")
-    side = rrb.Vertical(text, _plots("Joints [deg]", world.curves()), row_shares=[1.0, 1.0])
+    side = rrb.Vertical(text, _plots(world.curves_name, world.curves()), row_shares=[1.0, 1.0])
     return _window(rrb.Horizontal(world.view(), side, column_shares=[1.7, 1.0]))
 
 
@@ -81,7 +81,7 @@ def _bars(experiment: Experiment) -> rrb.View:
         origin=f"/{BARS}",
         name="Intervals of the weights",
         background=style.PAPER,
-        visual_bounds=rrb.VisualBounds2D(x_range=(-0.27, 1.04), y_range=(-0.07, height + 0.02)),
+        visual_bounds=rrb.VisualBounds2D(x_range=(-0.27, 1.04), y_range=(-0.07, 1.12 * height)),
     )
 
 
@@ -103,6 +103,7 @@ def _certificate() -> rrb.View:
         origin="/cpirl/log10",
         contents=[f"/cpirl/log10/{key}" for key in FIGURES if key != "regret"],
         name="Certificate and regret (log10)",
+        axis_x=_whole_run(),
         plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
         background=rrb.archetypes.PlotBackground(color=style.PAPER, show_grid=False),
     )
@@ -113,6 +114,13 @@ def _plots(name: str, curves: list[str]) -> rrb.View:
         origin="/",
         contents=curves,
         name=name,
+        axis_x=_whole_run(),
         background=rrb.archetypes.PlotBackground(color=style.PAPER, show_grid=False),
         plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
     )
+
+
+def _whole_run() -> rrb.TimeAxis:
+    """From the first frame to the last, wherever the cursor is."""
+    ends = rrb.TimeRangeBoundary.infinite()
+    return rrb.TimeAxis(view_range=rrb.TimeRange(start=ends, end=ends))

@@ -40,6 +40,8 @@ class WalkerView:
         expert: The expert's walk, or None where there is no ghost to show.
     """
 
+    curves_name = "Joints [deg]"
+
     def __init__(self, model: mujoco.MjModel, expert: Rollout | None = None) -> None:
         self.model = model
         self.expert = expert

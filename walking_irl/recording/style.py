@@ -16,10 +16,16 @@ POLYHEDRON_EDGE: Colour = (176, 102, 0)
 CUT: Colour = (226, 50, 50)
 """What the newest cut took away."""
 FRAME: Colour = (150, 154, 162)
+INK: Colour = (92, 96, 106)
+"""What belongs to nobody: arrows of a policy, cars of others."""
 LENS: Colour = (120, 150, 200)
 FORCE: Colour = (226, 88, 20)
 TRAIL: Colour = (28, 98, 190)
 PAPER: Colour = (248, 248, 246)
+SKIN: Colour = (222, 178, 148)
+ASPHALT: Colour = (150, 152, 158)
+GRASS: Colour = (178, 204, 160)
+GLASS: Colour = (52, 56, 66)
 LABEL: Colour = (255, 255, 255)
 """Text; the viewer puts it on a dark plate."""
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from walking_irl.recording.experiment import Experiment
+from walking_irl.recording.panels import panels
 from walking_irl.recovery import Recovery
 from walking_irl.types import Expert
 from walking_irl.versions import versions
@@ -47,15 +48,19 @@ def _result(experiment: Experiment, found: Recovery) -> str:
 
 def _table(experiment: Experiment, found: Recovery) -> str:
     hidden = experiment.w_expert
-    rows = ["| objective | hidden | recovered | interval | per raw unit |", "|---|---|---|---|---|"]
+    head = ["objective", "hidden", "recovered", "interval"]
+    is_scaled = any(o.scale != 1.0 for o in experiment.objectives)
+    if is_scaled:
+        head.append("per raw unit")
+    rows = [head, ["---"] * len(head)]
     for j, objective in enumerate(experiment.objectives):
         truth = "?" if hidden is None else f"{hidden[j]:.4f}"
         low, high = found.intervals[j]
-        rows.append(
-            f"| {objective.name} | {truth} | {found.w[j]:.4f} | {low:.4f} - {high:.4f} "
-            f"| {per_unit(found.physical_intervals[j], objective.unit)} |"
-        )
-    return "\n".join(rows)
+        cells = [objective.name, truth, f"{found.w[j]:.4f}", f"{low:.4f} - {high:.4f}"]
+        if is_scaled:
+            cells.append(per_unit(found.physical_intervals[j], objective.unit))
+        rows.append(cells)
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in rows)
 
 
 def per_unit(interval: Sequence[float], unit: str) -> str:
@@ -96,11 +101,14 @@ def noise_level(expert: Expert) -> str:
 
 
 def _legend(experiment: Experiment, world: str) -> str:
+    has_body = bool(panels(experiment.names))
     lines = [
         "Play, or drag through `frame`: all views move together.",
-        f"* **Left**: {world}." if world else "",
+        f"* **{'Left' if has_body else 'Above'}**: {world}." if world else "",
         "* **Amber body**: all weights that still explain the expert; what the newest cut took "
-        "away glows **red**. The box below magnifies it.",
+        "away glows **red**. The box below magnifies it."
+        if has_body
+        else "* **Amber bars**: what is left of each weight's interval.",
         "* **Blue** query, **green** estimate"
         + (", **red** hidden truth." if experiment.w_expert is not None else "."),
         "* **Certificate**: no matter which weights are true, a mixture of the policies found "

@@ -13,7 +13,13 @@ Motion_contra = TypeVar("Motion_contra", contravariant=True)
 
 
 class WorldView(Protocol[Motion_contra]):
-    """Shows one policy after the other under ``/world``."""
+    """Shows one policy after the other under ``/world``.
+
+    Attributes:
+        curves_name: What the curves are, with their unit.
+    """
+
+    curves_name: str
 
     def log_static(self, stream: rr.RecordingStream) -> None:
         """Log what never changes; called once, first."""
