@@ -117,6 +117,46 @@ def test_two_policies_mix_to_dominate_their_counterexample():
     assert game.value == pytest.approx(-0.1)
 
 
+def gravity_queries(menu, mu_E, level, rng):
+    """Queries at centres of gravity and what they find, each cut at the level."""
+    P = WeightPolyhedron.simplex(len(mu_E))
+    while True:
+        w = CENTRES["cg"](P, rng=rng).w
+        d = menu.forward(w).mu - mu_E
+        yield w, d
+        P = P.cut(d - level)
+
+
+def hidden_expert(rng, K):
+    menu = random_menu(rng, K)
+    return menu, menu.expert(rng.dirichlet(np.ones(K))).mu
+
+
+@pytest.mark.parametrize("accuracy", [0.1, 0.01])
+@pytest.mark.parametrize("K", [3, 4, 5])
+def test_certificate_falls_within_the_iteration_bound(K, accuracy):
+    rng = np.random.default_rng(K)
+    menu, mu_E = hidden_expert(rng, K)
+    rows = []
+    for _, d in gravity_queries(menu, mu_E, 0.0, rng):
+        rows.append(d)
+        if cert.game_lp(rows).value <= accuracy * np.max(rows):
+            break
+        assert len(rows) < cert.iteration_bound(K, accuracy, "cg")
+
+
+@pytest.mark.parametrize("accuracy", [0.1, 0.01])
+@pytest.mark.parametrize("K", [3, 4, 5])
+def test_regret_reaches_a_level_within_the_level_bound(K, accuracy):
+    rng = np.random.default_rng(K)
+    menu, mu_E = hidden_expert(rng, K)
+    level = accuracy * max(float((menu.M @ e).max() - mu_E @ e) for e in np.eye(K))
+    for n_cuts, (w, d) in enumerate(gravity_queries(menu, mu_E, level, rng)):
+        if w @ d <= level:
+            break
+        assert n_cuts + 1 <= cert.level_bound(K, accuracy)
+
+
 def test_iteration_bounds_match_their_closed_form():
     assert cert.iteration_bound(5, 0.1, "cg") == pytest.approx(20.9, abs=0.1)
     assert cert.iteration_bound(5, 0.1, "mvie") == pytest.approx(56.2, abs=0.1)
