@@ -27,6 +27,8 @@ LENS_CENTRE = np.array([-0.2, -0.2, -0.72])
 LABEL_DROP = 1.25 * LENS_RADIUS
 CLEAR_EDGES, MOST_EDGES = 40, 90
 """Edges from which lines become thinner, and the most that are drawn."""
+CUT_ALPHA, CUT_EDGE = 0.42, 2.6
+"""Opacity of what the newest cut took away, and width of its edges, before it fades."""
 STEPS = np.array([1.0, 2.0, 3.0, 5.0, 7.0])
 """Magnifications are these times powers of ten."""
 
@@ -129,23 +131,26 @@ class PolyhedronView:
         if len(faces) == 0:
             return
         edges = _edges_lost(before, after)
-        for step in range(style.FADE_STEPS + 1):
-            clock.set(stream, step * style.FADE_FRAMES // style.FADE_STEPS)
-            left = 1.0 - step / style.FADE_STEPS
-            for root, see in _pictures(panel, lens):
-                at = before.points if see is None else see(before.points)
-                if left <= 0.0:
-                    stream.log(f"{root}/cut", rr.Clear(recursive=True))
-                    continue
-                stream.log(f"{root}/cut", _mesh(at, faces, style.CUT, 0.42 * left))
-                strips = edges if see is None else see(edges)
-                glow = rr.LineStrips3D(  # lines are always opaque: they shrink, then vanish
-                    strips if left > 0.5 else strips[:0],
-                    colors=[style.CUT],
-                    radii=rr.Radius.ui_points([2.6 * left]),
-                )
-                stream.log(f"{root}/cut/edges", glow)
-        clock.set(stream)
+        for root, see in _pictures(panel, lens):
+            at, strips = before.points, edges
+            if see is not None:
+                at, strips = see(at), see(strips)
+            stream.log(f"{root}/cut", _mesh(at, faces, style.CUT, CUT_ALPHA))
+            glow = rr.LineStrips3D(
+                strips, colors=[style.CUT], radii=rr.Radius.ui_points([CUT_EDGE])
+            )
+            stream.log(f"{root}/cut/edges", glow)
+            for step in range(1, style.FADE_STEPS):  # only what changes, for a small file
+                clock.set(stream, step * style.FADE_FRAMES // style.FADE_STEPS)
+                left = 1.0 - step / style.FADE_STEPS
+                faded = style.with_alpha(style.CUT, CUT_ALPHA * left)
+                stream.log(f"{root}/cut", rr.Mesh3D.from_fields(albedo_factor=faded))
+                # lines are always opaque: they shrink, then vanish
+                width = rr.Radius.ui_points([CUT_EDGE * left if left > 0.5 else 0.0])
+                stream.log(f"{root}/cut/edges", rr.LineStrips3D.from_fields(radii=width))
+            clock.set(stream, style.FADE_FRAMES)
+            stream.log(f"{root}/cut", rr.Clear(recursive=True))
+            clock.set(stream)
 
 
 def _pictures(panel: Panel, lens: Lens | None) -> list[tuple[str, Lens | None]]:

@@ -115,7 +115,6 @@ class Recorder(Generic[Motion]):
         if self.world is not None and motion is not None:
             n_frames = self.world.log_iteration(self._stream, clock, motion, is_last)
         self._n_frames = clock.first + n_frames
-        self._stream.flush(timeout_sec=FLUSH_SECONDS)
 
     def _save(self, ending: str | None) -> None:
         world = "" if self.world is None else self.world.describe()
@@ -127,6 +126,7 @@ class Recorder(Generic[Motion]):
         self._stream.log("summary", markdown, static=True)
         values = rr.AnyValues(**properties(e, found, ending))
         self._stream.send_property("experiment", values)
+        self._stream.flush(timeout_sec=FLUSH_SECONDS)  # once: every chunk costs a kilobyte
         write_atomically(self.path, self._memory.drain_as_bytes())
 
 
