@@ -28,7 +28,7 @@ from walking_irl.recording.motion import periodic_rollout, play, sample
 from walking_irl.recording.panels import panels
 from walking_irl.recording.reader import Recording, check_recording, inspect_recording
 from walking_irl.recording.screenshot import open_viewer, save_screenshot
-from walking_irl.recording.style import PLAYBACK_RATE
+from walking_irl.recording.style import FADE_FRAMES, PLAYBACK_RATE
 from walking_irl.recovery import summarise
 from walking_irl.types import Array, Expert, Iteration, Objective, Response, Rollout, Rule, Status
 from walking_irl.versions import versions
@@ -296,6 +296,12 @@ def test_what_a_cut_took_away_fades(recorded: Recording) -> None:
     per_cut = len(opacity) // 3  # the first iteration has no cut before it
     assert per_cut > 4 and np.all(np.diff(opacity[:per_cut]) < 0)
     assert column.times[0] == FRAMES_PER_ITERATION
+    edges = "/polyhedron/shadow_123/cut/edges"
+    radii = recorded.column(edges, "LineStrips3D:radii")
+    width = np.abs(np.ravel(radii.rows))  # in points, which are negative
+    assert np.all(np.diff(width[: len(width) // 3]) < 0)
+    gone = recorded.column(edges, "Clear:is_recursive").times
+    assert radii.times[len(width) // 3 - 1] < gone[0] < FRAMES_PER_ITERATION + FADE_FRAMES
 
 
 @pytest.mark.parametrize("scale", [1.0, 1e-4, 1e-8])

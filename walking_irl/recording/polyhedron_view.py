@@ -146,8 +146,9 @@ class PolyhedronView:
                 faded = style.with_alpha(style.CUT, CUT_ALPHA * left)
                 stream.log(f"{root}/cut", rr.Mesh3D.from_fields(albedo_factor=faded))
                 # lines are always opaque: they shrink, then vanish
-                width = rr.Radius.ui_points([CUT_EDGE * left if left > 0.5 else 0.0])
-                stream.log(f"{root}/cut/edges", rr.LineStrips3D.from_fields(radii=width))
+                thinner = rr.LineStrips3D.from_fields(radii=rr.Radius.ui_points([CUT_EDGE * left]))
+                is_seen = left > 0.5
+                stream.log(f"{root}/cut/edges", thinner if is_seen else rr.Clear(recursive=False))
             clock.set(stream, style.FADE_FRAMES)
             stream.log(f"{root}/cut", rr.Clear(recursive=True))
             clock.set(stream)
