@@ -70,7 +70,7 @@ def per_unit(interval: Sequence[float], unit: str) -> str:
     ('0.25 - 0.5 per m^2/s^3', '1 - 1 per (rad^2 s)', '0 - 1')
     """
     low, high = interval
-    unit = f"({unit})" if " " in unit else unit
+    unit = f"({unit})" if " " in unit and not unit.startswith("(") else unit
     return f"{low:.3g} - {high:.3g}" + ("" if unit == "1" else f" per {unit}")
 
 
