@@ -8,6 +8,7 @@ import walking_irl
 ROOT = Path(walking_irl.__file__).parent
 CORE = [
     "dual_simplex",
+    "gauge",
     "halfspaces",
     "polyhedron",
     "certificates",

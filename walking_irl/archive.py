@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from walking_irl.errors import EmptyPolyhedronError, InvalidInputError, SolverError
+from walking_irl.gauge import has_constant_sum
 from walking_irl.polyhedron import WeightPolyhedron
 from walking_irl.types import Array, Expert, Response
 
@@ -82,6 +83,10 @@ class Archive:
         """Which queries' policies are the demonstration itself, shape (n,)."""
         same: NDArray[np.bool_] = np.all(self.M == self.expert.mu, axis=1)
         return same
+
+    def has_gauge(self) -> bool:
+        """Whether all policies' features sum to the expert's, so that 1/K explains everything."""
+        return has_constant_sum(np.r_[self.M, self._spare] - self.expert.mu)
 
     def differences(self) -> Array:
         """Robust d_i = mu_i - (mu_E + e_E) of all policies, queries first; shape (n, K)."""

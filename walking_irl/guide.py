@@ -12,6 +12,7 @@ from walking_irl.archive import Archive
 from walking_irl.centres.centre import CentreRule
 from walking_irl.certificates import game_lp
 from walking_irl.errors import EmptyPolyhedronError, FlatPolyhedronError
+from walking_irl.gauge import SAME, gauge_fixed
 from walking_irl.newton import Step, newton_step, reduced, standard_errors, with_secants
 from walking_irl.polyhedron import WeightPolyhedron
 from walking_irl.types import Array, Rule, Status
@@ -122,6 +123,9 @@ class Guide:
         W = self.archive.W
         scale = np.maximum(self.archive.scale(W), 1e-300)
         relative: Array = self.archive.regrets(W) / scale
+        if self.archive.has_gauge():  # f is linear from 0 at 1/K outwards
+            distance = 1.0 - self.archive.K * W.min(axis=1)
+            relative = np.where(distance > SAME, relative / np.maximum(distance, SAME), np.inf)
         return relative
 
     def _lower_bound(self) -> float:
@@ -194,12 +198,16 @@ class Guide:
                 if f + t <= tol * scale:
                     return Status.MIXTURE_DOMINATES if t < -tol * scale else Status.GAP_CLOSED
             return None
-        w = archive.W[-1]
-        f = float(
-            archive.values(w) - w @ (archive.mu + archive.error + archive.expert.suboptimality)
-        )
-        if self.is_exact and archive.expert.suboptimality == 0.0 or self.model is not None:
-            f = float(self._relative_regrets()[-1] * archive.scale(w))
+        w: Array | None = archive.W[-1]
+        if archive.has_gauge() and not archive.is_match()[-1]:
+            w = gauge_fixed(archive.W[-1])
+        if w is None:  # uniform weights explain every expert
+            return None
+        is_trusted = self.is_exact and archive.expert.suboptimality == 0.0
+        slack = archive.error + archive.expert.suboptimality
+        if is_trusted or self.model is not None:
+            slack = np.zeros(archive.K)
+        f = float(archive.values(w) - w @ (archive.mu + slack))
         is_suspect = self.model is not None and bool(archive.is_match()[-1])
         is_matched = f <= tol * float(archive.scale(w)) and not is_suspect
         if is_matched and (self.model is None or self.is_exact):
