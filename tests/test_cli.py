@@ -160,7 +160,7 @@ def test_recover_planar_exactly(call, tmp_path):
     inspected = json.loads((tmp_path / "inspected.json").read_text())
     assert np.allclose(inspected["w"], content["w"])
     assert inspected["has_blueprint"] and inspected["iterations"] == len(content["history"])
-    assert "per raw unit" in out and "(100 W)" in out
+    assert "per raw unit" in out and "per (100 W)" in out
     found = content["summary"]
     assert np.allclose(inspected["physical_intervals"], found["physical_intervals"])
     assert f"rule: {found['rule']}" in " ".join(out.split())

@@ -327,7 +327,9 @@ def _table_of_recording(content: dict[str, Any]) -> Table:
             "-" if bounds is None else f"{bounds[j][0]:.4f} .. {bounds[j][1]:.4f}",
             "-"
             if content["physical_intervals"] is None
-            else per_unit(content["physical_intervals"][j], content["units"][j]),
+            else per_unit(content["physical_intervals"][j], content["units"][j]).replace(
+                " per ", "\nper "
+            ),
         )
     return table
 
