@@ -16,6 +16,7 @@ from scipy.spatial import cKDTree
 
 from walking_irl.errors import EmptyPolyhedronError
 from walking_irl.recording import style
+from walking_irl.recording.drawing import text_3d
 from walking_irl.recording.experiment import Clock, Experiment
 from walking_irl.recording.hulls import Hull, faces_lost, hull
 from walking_irl.recording.panels import Panel, panels
@@ -179,7 +180,7 @@ def _log_frame(stream: rr.RecordingStream, panel: Panel) -> None:
     sides = np.array(list(combinations(panel.corners, 2)))
     lines = rr.LineStrips3D(sides, colors=[style.FRAME], radii=rr.Radius.ui_points([1.0]))
     stream.log(f"{panel.path}/frame", lines, static=True)
-    tips = _text(panel.tips, list(panel.labels))
+    tips = text_3d(panel.tips, list(panel.labels))
     stream.log(f"{panel.path}/names", tips, static=True)
 
 
@@ -196,13 +197,7 @@ def _log_lens(stream: rr.RecordingStream, panel: Panel, lens: Lens) -> None:
     lines = rr.LineStrips3D(boxes, colors=[style.LENS], radii=rr.Radius.ui_points([1.0]))
     stream.log(f"{panel.path}/lens/box", lines)
     foot = lens.place - LABEL_DROP * np.array([0, 1, 0] if panel.is_flat else [0, 0, 1])
-    stream.log(f"{panel.path}/lens/scale", _text(foot[None], [f"magnified {lens.zoom:,.0f} x"]))
-
-
-def _text(at: Array, labels: list[str]) -> rr.Points3D:
-    """Text alone, at points of shape (n, 3)."""
-    none = rr.Radius.ui_points([0.0])
-    return rr.Points3D(at, labels=labels, colors=[style.LABEL], radii=none, show_labels=True)
+    stream.log(f"{panel.path}/lens/scale", text_3d(foot[None], [f"magnified {lens.zoom:,.0f} x"]))
 
 
 def _log_set(stream: rr.RecordingStream, root: str, body: Hull, see: Lens | None) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import rerun as rr
 
 from walking_irl.recording import style
+from walking_irl.recording.drawing import text_2d
 from walking_irl.recording.experiment import Clock, Experiment
 from walking_irl.types import Array, Iteration
 
@@ -88,10 +89,11 @@ class ProgressView:
                             radii=rr.Radius.ui_points([0.8])),
             static=True,
         )  # fmt: skip
-        _log_labels(stream, "names", np.c_[np.full(self._K, -0.13), y], self._experiment.names)
+        names = text_2d(np.c_[np.full(self._K, -0.13), y], self._experiment.names)
+        stream.log(f"{BARS}/names", names, static=True)
         ticks = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
         below = np.c_[ticks, np.full(5, y[-1] + 0.6 * ROW)]
-        _log_labels(stream, "ticks", below, [f"{t:g}" for t in ticks])
+        stream.log(f"{BARS}/ticks", text_2d(below, [f"{t:g}" for t in ticks]), static=True)
         if self._experiment.w_expert is not None:
             marks = _upright(self._experiment.w_expert, y, 0.36)
             stream.log(
@@ -149,13 +151,6 @@ def _log_style(
         names=names, colors=colours, widths=widths, interpolation_mode="StepAfter"
     )
     stream.log(path, lines, static=True)
-
-
-def _log_labels(stream: rr.RecordingStream, name: str, at: Array, labels: list[str]) -> None:
-    points = rr.Points2D(
-        at, labels=labels, colors=[style.LABEL], radii=rr.Radius.ui_points([0.0]), show_labels=True
-    )
-    stream.log(f"{BARS}/{name}", points, static=True)
 
 
 def _upright(x: Array, y: Array, height: float) -> Array:
