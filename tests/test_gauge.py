@@ -54,4 +54,5 @@ def test_macro_cells_are_not_matched_by_uniform_weights(seed):
     assert v is not None
     assert v @ (domain.forward(v).mu - expert.mu) <= 1e-6 * (v @ expert.mu)
     loss = w_E @ (expert.mu - run[-1].response.mu)
-    assert loss <= 1e-4 * (w_E @ expert.mu)  # these weights explain the expert, they are not its own
+    # These weights explain the expert; they need not be its own.
+    assert loss <= 1e-4 * (w_E @ expert.mu)
