@@ -28,8 +28,9 @@ from walking_irl.domains.humanoid.normal_equations import Factor, NormalMatrix
 from walking_irl.domains.humanoid.population import typical_weights
 from walking_irl.domains.humanoid.protocol import Protocol, measure
 from walking_irl.domains.humanoid.transcription import Transcription
+from walking_irl.case import MAX_SOLVES
 from walking_irl.humanoid_case import MIN_WEIGHT
-from walking_irl.session import MAX_SOLVES, PROBE
+from walking_irl.session import PROBE
 from walking_irl.types import Expert, Iteration
 
 DERIVATIVES = "MuJoCo's inverse dynamics and derivatives"

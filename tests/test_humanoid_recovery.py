@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from walking_irl import session
-from walking_irl.session import Setup, run, workers
+from walking_irl.case import Setup
+from walking_irl.session import run, workers
 from walking_irl.types import Status
 
 PLANAR = Setup(domain="humanoid-planar", rollouts=0, seed=0)
@@ -62,8 +63,9 @@ def test_same_seed_gives_same_weights(planar):
 
 def test_other_hidden_weights_for_scoring_change_nothing_that_is_learnt(planar, monkeypatch):
     report, case = planar
-    forward = case.domain.learner(case.expert, case.forward.threads)
-    other = replace(case, w_expert=np.roll(case.w_expert, 1), forward=forward)
+    forward = case.domain.learner(case.subject.expert, case.forward.threads)
+    subject = replace(case.subject, w_expert=np.roll(case.subject.w_expert, 1))
+    other = replace(case, subject=subject, forward=forward)
     monkeypatch.setattr(session, "prepare", lambda setup, executor: other)
     again, _ = recover(PLANAR)
     assert not np.allclose(again.w_expert, report.w_expert) and again.l1_error > 0.1
@@ -92,19 +94,19 @@ def holds(content, w):
 @pytest.mark.parametrize("knowledge", ["planar", "recorded"])
 def test_learner_never_sees_the_hidden_weights(knowledge, request):
     _, case = request.getfixturevalue(knowledge)
-    given = {"expert": case.expert, "forward": case.forward}
+    given = {"expert": case.subject.expert, "forward": case.forward}
     if case.measure is not None:
         given["measure"] = copy(case.measure)
         given["measure"].executor = None  # a process pool cannot be pickled, and knows nothing
-    peeking = pickle.dumps((case.expert, case.w_expert))
-    assert holds(peeking, case.w_expert)  # the search finds what is there
+    peeking = pickle.dumps((case.subject.expert, case.subject.w_expert))
+    assert holds(peeking, case.subject.w_expert)  # the search finds what is there
     for name, part in given.items():
-        assert not holds(pickle.dumps(part), case.w_expert), name
+        assert not holds(pickle.dumps(part), case.subject.w_expert), name
 
 
 def test_planar_walker_recovered_from_recorded_walks(recorded):
     report, case = recorded
-    assert len(case.trajectories) == 20 and case.expert.covariance is not None
+    assert len(case.subject.trajectories) == 20 and case.subject.expert.covariance is not None
     assert_recovered(report, l1_error=0.005, solves=20)
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from walking_irl.case import Case, Setup, prepare
 from walking_irl.cpirl import cpirl
 from walking_irl.domains import DOMAINS, load
 from walking_irl.domains.driving import Driving, DrivingPicture
@@ -20,7 +21,6 @@ from walking_irl.recording.path_view import LAST_LONGEST, LAST_PACE, PACE
 from walking_irl.recording.reader import Recording, inspect_recording
 from walking_irl.recording.style import PLAYBACK_RATE
 from walking_irl.recording.worlds import WORLDS, world_of
-from walking_irl.session import Case, Setup, prepare
 from walking_irl.types import Array, Iteration
 
 MOST_FRAMES, MOST_BYTES = 130, 250_000
@@ -76,13 +76,13 @@ def shown(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
 def record(name: str, path: Path) -> Shown:
     case = prepare(Setup(domain=name, record=path), None)
     rng = np.random.default_rng(0)
-    iterations = list(cpirl(case.forward, case.expert, max_solves=3, rng=rng))
-    objectives = case.domain.objectives
-    experiment = Experiment(name, objectives, case.expert, seed=0, w_expert=case.w_expert)
+    expert, w_expert = case.subject.expert, case.subject.w_expert
+    iterations = list(cpirl(case.forward, expert, max_solves=3, rng=rng))
+    experiment = Experiment(name, case.domain.objectives, expert, seed=0, w_expert=w_expert)
     with Recorder(path, experiment, case.world) as recorder:
         for it in iterations:
             recorder.iteration(it, case.motion(it.response.policy, it.w))
-        recorder.finale(case.motion(case.expert.demonstration, case.w_expert))
+        recorder.finale(case.motion(expert.demonstration, w_expert))
     return Shown(name, case, iterations, Recording(path))
 
 
@@ -107,7 +107,7 @@ def test_the_world_is_in_the_recording(shown: Shown) -> None:
 def test_what_is_known_of_the_run_is_read_back(shown: Shown) -> None:
     found = inspect_recording(shown.recording.path)
     assert (found["domain"], found["iterations"]) == (shown.name, len(shown.iterations))
-    np.testing.assert_allclose(found["w_expert"], shown.case.w_expert)
+    np.testing.assert_allclose(found["w_expert"], shown.case.subject.w_expert)
     scales = np.array([o.scale for o in shown.case.domain.objectives])
     physical = shown.iterations[-1].intervals / scales[:, None]
     np.testing.assert_allclose(found["physical_intervals"], physical)
@@ -134,7 +134,7 @@ def test_worlds_that_move_have_a_row_in_every_frame(shown: Shown) -> None:
 def test_an_unknown_expert_is_left_out(shown: Shown, tmp_path: Path) -> None:
     case = shown.case
     view, motion = world_of(shown.name, case.domain)
-    experiment = Experiment(shown.name, case.domain.objectives, case.expert)
+    experiment = Experiment(shown.name, case.domain.objectives, case.subject.expert)
     with Recorder(tmp_path / "a.rrd", experiment, view) as recorder:
         for it in shown.iterations[:1]:
             recorder.iteration(it, motion(it.response.policy, it.w))
@@ -156,12 +156,12 @@ def test_grid_shows_rewards_visits_and_actions(shown: Shown) -> None:
         cells = np.array(image).reshape(N_CELLS, N_CELLS, 3).astype(int)
         amount = np.where(picture.regions < 0, 0.0, it.w[picture.regions])
         assert np.all(cells[amount == 0.0] == style.PAPER)
-        below = amount < shown.case.w_expert.max()  # beyond, the colour is full
+        below = amount < shown.case.subject.w_expert.max()  # beyond, the colour is full
         order = np.argsort(amount[below])
         assert np.all(np.diff(cells[below][order, 2]) <= 0)  # less blue: more amber
         drawn = np.array(arrows).reshape(N_CELLS, N_CELLS, 2)
         np.testing.assert_allclose(np.sign(drawn[..., ::-1]), picture.arrows)
-    expert = shown.picture(shown.case.expert.demonstration)
+    expert = shown.picture(shown.case.subject.expert.demonstration)
     (seen,) = shown.recording.static("/world/expert/visits")["Image:buffer"]
     red = np.array(seen).reshape(N_CELLS, N_CELLS, 3).astype(int)
     assert np.unravel_index(red[..., 1].argmin(), red.shape[:2]) == np.unravel_index(
@@ -172,7 +172,7 @@ def test_grid_shows_rewards_visits_and_actions(shown: Shown) -> None:
 @only("gridworld")
 def test_grid_tells_where_learner_and_expert_differ(shown: Shown) -> None:
     agreement = np.ravel(shown.recording.column("/curves/agreement", "Scalars:scalars").rows)
-    pi = shown.case.expert.demonstration
+    pi = shown.case.subject.expert.demonstration
     expected = [100 * np.mean(it.response.policy == pi) for it in shown.iterations]
     np.testing.assert_allclose(agreement, [*expected, 100.0])
     assert agreement[0] < 100.0
@@ -212,7 +212,7 @@ def test_people_walk_from_the_start_to_their_goals(shown: Shown) -> None:
         apart = 2 * np.arctan2(z, w) - poses[:, 2]
         np.testing.assert_allclose(np.cos(apart), 1.0, atol=1e-6)
     finale = inspect_recording(shown.recording.path)["frames"] - shown.starts[-1]
-    time = shown.picture(shown.case.expert.demonstration).time
+    time = shown.picture(shown.case.subject.expert.demonstration).time
     longest = max(float(t[-1]) for t in time) * PLAYBACK_RATE
     assert finale > min(longest / LAST_PACE, LAST_LONGEST) > 2 * longest / PACE
 
@@ -284,7 +284,7 @@ def test_collisions_and_leaving_the_road_are_the_features() -> None:
 
 @only("driving")
 def test_colliding_cars_change_colour(shown: Shown) -> None:
-    picture = shown.picture(shown.case.expert.demonstration)
+    picture = shown.picture(shown.case.subject.expert.demonstration)
     rows = shown.recording.column("/world/expert/car/body", "Boxes3D:colors").rows
     colours = np.ravel(rows[-LAST_STEPS * FRAMES_PER_STEP :])
     is_orange = colours >> 8 == int.from_bytes(bytes(style.FORCE), "big")

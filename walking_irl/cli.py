@@ -15,6 +15,7 @@ import argparse
 import sys
 from collections.abc import Sequence
 from concurrent.futures import BrokenExecutor
+from functools import partial
 from pathlib import Path
 from typing import NoReturn
 
@@ -28,6 +29,7 @@ examples:
   walking-irl recover                          the main job: who walks like this, and what for?
   walking-irl recover --seed 7 --rollouts 0    another hidden walker, known exactly
   walking-irl recover --weights 1,1,1,1,1,4    hidden weights of your own
+  walking-irl recover --resume walking.archive.npz --max-solves 40
   walking-irl gait --weights 1,2,1,1,1,5 --png gait.png
   walking-irl inspect walking.rrd
   walking-irl view walking.rrd
@@ -77,38 +79,26 @@ def build_parser() -> argparse.ArgumentParser:
 
 
 def _recover_parser(p: argparse.ArgumentParser) -> None:
-    p.add_argument("--domain", default="humanoid", help="see walking-irl domains (%(default)s)")
-    p.add_argument("--centre", default="ac", help="query point: ac, cg, mvie or cc (%(default)s)")
-    p.add_argument(
+    p.set_defaults(run="recover")
+    setting = partial(p.add_argument, default=argparse.SUPPRESS)  # Setup has the defaults
+    setting("--domain", help="see walking-irl domains (humanoid)")
+    setting("--centre", help="query point: ac, cg, mvie or cc (ac)")
+    setting(
         "--mode",
-        default=None,
         help="optimal: the expert is optimal; set: to a tolerance; minimise: it need not be "
-        "(default: optimal, minimise for a suboptimal expert)",
+        "(optimal; minimise for a suboptimal expert)",
     )
-    p.add_argument(
-        "--expert",
-        default="optimal",
-        help="optimal, or suboptimal: a spoilt walk, known exactly (%(default)s)",
-    )
+    setting("--expert", help="optimal, or suboptimal: spoilt, known exactly (optimal)")
     hidden = p.add_mutually_exclusive_group()
-    hidden.add_argument(
-        "--seed", type=int, default=0, help="draws the hidden weights (%(default)s)"
-    )
-    hidden.add_argument("--weights", metavar="W1,W2,...", help="hidden weights of your own")
-    hidden.add_argument("--demonstration", type=Path, metavar="FILE", help="a gait (.npz or .csv)")
-    p.add_argument("--population", default="typical", help="typical or uniform (%(default)s)")
-    p.add_argument(
-        "--rollouts", type=int, default=20, help="recorded walks; 0: exact (%(default)s)"
-    )
-    p.add_argument(
-        "--noise", type=float, default=0.02, help="s.d. of joint velocities [rad/s] (%(default)s)"
-    )
-    p.add_argument(
-        "--disturbance", default="initial", help="initial, or kicks in every cycle (%(default)s)"
-    )
-    p.add_argument(
-        "--max-solves", type=int, default=20, help="budget of forward solves (%(default)s)"
-    )
+    own = partial(hidden.add_argument, default=argparse.SUPPRESS)
+    own("--seed", type=int, help="draws the hidden weights (0)")
+    own("--weights", metavar="W1,W2,...", help="hidden weights of your own")
+    own("--demonstration", type=Path, metavar="FILE", help="a gait (.npz or .csv)")
+    setting("--population", help="typical or uniform (typical)")
+    setting("--rollouts", type=int, help="recorded walks; 0: exact (20)")
+    setting("--noise", type=float, help="s.d. of joint velocities [rad/s] (0.02)")
+    setting("--disturbance", help="initial, or kicks in every cycle (initial)")
+    setting("--max-solves", type=int, help="budget of forward solves (20)")
     p.add_argument(
         "--record",
         type=Path,
@@ -117,9 +107,17 @@ def _recover_parser(p: argparse.ArgumentParser) -> None:
         help="where the recording goes (%(default)s); the expert's walks go beside it",
     )
     p.add_argument("--no-record", action="store_true", help="write no recording")
+    p.add_argument(
+        "--archive",
+        type=Path,
+        metavar="FILE.npz",
+        help="where the solver's answers go, to resume from (beside the recording)",
+    )
+    p.add_argument(
+        "--resume", type=Path, metavar="FILE.npz", help="go on from such an archive, as it began"
+    )
     p.add_argument("--json", type=Path, metavar="FILE.json", help="write all figures as JSON")
     p.add_argument("--quiet", action="store_true", help="print the result only")
-    p.set_defaults(run="recover")
 
 
 def _gait_parser(p: argparse.ArgumentParser) -> None:

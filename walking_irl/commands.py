@@ -6,6 +6,7 @@ import argparse
 import io
 import os
 import sys
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,11 +23,13 @@ from rich.progress import (
 )
 from rich.table import Table
 
+from walking_irl.case import Case, Setup
 from walking_irl.domains import DOMAINS, load
 from walking_irl.errors import InvalidInputError
 from walking_irl.output import check_ending, check_outputs, write_file
 from walking_irl.report import Report, write_json
-from walking_irl.session import Case, Setup, run, workers
+from walking_irl.saved_run import load_run
+from walking_irl.session import run, workers
 from walking_irl.types import Array, Iteration, Rollout, Rule
 
 INTERRUPTED = 130
@@ -54,28 +57,15 @@ def show_weights(w: Array, console: Console) -> None:
 
 def recover(args: argparse.Namespace, console: Console) -> int:
     """``walking-irl recover``."""
-    record = None if args.no_record else args.record
-    setup = Setup(
-        domain=args.domain,
-        centre=args.centre,
-        mode=args.mode or ("minimise" if args.expert == "suboptimal" else "optimal"),
-        expert=args.expert,
-        seed=args.seed,
-        weights=None if args.weights is None else parse_weights(args.weights),
-        population=args.population,
-        rollouts=args.rollouts,
-        noise=args.noise,
-        disturbance=args.disturbance,
-        demonstration=args.demonstration,
-        max_solves=args.max_solves,
-        record=record,
-    )
-    check_ending(record, ".rrd")
-    walks = None if record is None else record.with_suffix(".npz")
-    check_outputs([record, walks, args.json])
+    saved = None if args.resume is None else load_run(args.resume)
+    setup = _setup(args, None if saved is None else saved.setup)
+    check_ending(setup.record, ".rrd")
+    check_ending(setup.archive, ".npz")
+    walks = None if setup.record is None else setup.record.with_suffix(".npz")
+    check_outputs([setup.record, walks, setup.archive, args.json])
     load(setup.domain)
 
-    saved: list[Path] = []
+    written: list[Path] = []
 
     progress = Progress(
         SpinnerColumn(),
@@ -96,14 +86,17 @@ def recover(args: argparse.Namespace, console: Console) -> int:
         case.watch(
             lambda i, cost: progress.update(task, description=f"solver iteration {i}, J {cost:.5f}")
         )
-        if walks is not None and case.trajectories:
-            save_walks(walks, case.trajectories, case.domain.walker.joints)
-            saved.append(walks)
+        if walks is not None and case.subject.trajectories:
+            save_walks(walks, case.subject.trajectories, case.domain.walker.joints)
+            written.append(walks)
         if not args.quiet:
-            if setup.weights is not None and case.w_expert is not None:
-                show_weights(case.w_expert, console)
-            known = f"{len(case.trajectories)} recorded walks" if case.trajectories else "itself"
-            console.print(f"expert ready, known by {known}; the learner starts")
+            subject = case.subject
+            if setup.weights is not None and subject.w_expert is not None:
+                show_weights(subject.w_expert, console)
+            n = subject.expert.n_samples
+            known = f"{n} recorded walks" if n else "itself"
+            again = "" if saved is None else f"; solves: {len(saved.answers)} known from before"
+            console.print(f"expert ready, known by {known}; the learner starts{again}")
 
     def on_iteration(it: Iteration, report: Report) -> None:
         progress.update(task, completed=it.k + 1)
@@ -113,10 +106,17 @@ def recover(args: argparse.Namespace, console: Console) -> int:
             console.print(progress_line(it, report))
 
     if not args.quiet:
-        console.print(f"{setup.domain}: solving for the expert ...")
+        source = "solving for" if saved is None else f"{args.resume} knows"
+        console.print(f"{setup.domain}: {source} the expert ...")
     with workers() as executor, progress:
-        report = run(setup, executor=executor, on_expert=on_expert, on_iteration=on_iteration)
-    show_report(report, console, saved[0] if saved else None)
+        report = run(
+            setup,
+            saved=saved,
+            executor=executor,
+            on_expert=on_expert,
+            on_iteration=on_iteration,
+        )
+    show_report(report, console, written[0] if written else None)
     if args.json is not None:
         write_json(args.json, report.to_json())
     if report.failed_write is not None:
@@ -124,6 +124,26 @@ def recover(args: argparse.Namespace, console: Console) -> int:
     if report.was_interrupted:
         return INTERRUPTED
     return 0 if report.is_success else 1
+
+
+def _setup(args: argparse.Namespace, before: Setup | None) -> Setup:
+    """The setup of a new run, or of one that goes on with what it began with."""
+    given = {f.name: getattr(args, f.name) for f in fields(Setup) if hasattr(args, f.name)}
+    given["record"] = None if args.no_record else args.record
+    if before is None:
+        if "weights" in given:
+            given["weights"] = parse_weights(given["weights"])
+        if given.get("expert") == "suboptimal":
+            given.setdefault("mode", "minimise")
+        if args.archive is None and given["record"] is not None:
+            given["archive"] = given["record"].with_suffix(".archive.npz")
+        return Setup(**given)
+    other = given.keys() - {"record", "archive", "max_solves"}
+    if other:
+        options = " and ".join("--" + name.replace("_", "-") for name in sorted(other))
+        raise InvalidInputError(f"a resumed run keeps its settings; leave out {options}")
+    given["archive"] = args.archive or args.resume
+    return replace(before, **given)
 
 
 def progress_line(it: Iteration, report: Report) -> str:
@@ -178,6 +198,9 @@ def show_report(report: Report, console: Console, walks: Path | None) -> None:
         console.print(f"recording {escape(report.recording)}: walking-irl view {report.recording}")
     if walks is not None:
         console.print(f"the expert's walks: {escape(str(walks))}")
+    if report.archive is not None and not report.is_success:
+        path = escape(report.archive)
+        console.print(f"to go on from here: walking-irl recover --resume {path} --max-solves N")
 
 
 def save_walks(path: Path, walks: tuple[Rollout, ...], joints: tuple[str, ...]) -> None:

@@ -18,7 +18,7 @@ from walking_irl.errors import InvalidInputError
 from walking_irl.types import Rollout
 
 if TYPE_CHECKING:
-    from walking_irl.session import Case, Setup
+    from walking_irl.case import Case, Setup, Subject
 
 THREADS = 2
 """Threads of one learner's solve: solves follow one another, so the cores would idle."""
@@ -28,48 +28,53 @@ PHYSICAL = 0.05
 """Largest root force of a demonstration [body weights]: more is not this body's walk."""
 
 
-def humanoid_case(domain: Humanoid, setup: Setup, executor: Executor | None) -> Case:
+def humanoid_subject(domain: Humanoid, setup: Setup, executor: Executor | None) -> Subject:
     """The expert that a setup asks for."""
-    from walking_irl.session import Case
+    from walking_irl.case import Subject
 
-    is_spoilt = setup.expert == "suboptimal"
-    protocol = Protocol(0 if is_spoilt else setup.rollouts, setup.noise, setup.disturbance)
     if setup.demonstration is not None:
         gait = load_gait(setup.demonstration, domain.walker)
-        expert = exact_expert(gait, _folded(domain, gait, setup.demonstration))
-        case = Case(domain, expert, domain.learner(expert, THREADS), min_weight=MIN_WEIGHT)
-    else:
-        rng = np.random.default_rng(setup.seed)
-        if setup.population not in POPULATIONS:
-            choices = ", ".join(POPULATIONS)
-            raise InvalidInputError(
-                f"unknown population {setup.population!r}; choose from {choices}"
-            )
-        w_E = POPULATIONS[setup.population](rng)
-        if setup.weights is not None:
-            w_E = check_weights(np.asarray(setup.weights))
-        if is_spoilt:
-            made = domain.demonstrate_poorly(w_E, rng, executor)
-        else:
-            made = domain.demonstrate(w_E, rng, protocol, executor)
-        gait = made.gait
-        case = Case(
-            domain,
-            made.expert,
-            domain.learner(made.expert, THREADS),
-            measure=domain.remeasure(protocol, setup.seed, executor),
-            min_weight=MIN_WEIGHT,
-            w_expert=w_E,
-            true_mu=made.expert.mu if is_spoilt else -made.optimum.folded,
-            trajectories=made.rollouts,
-        )
+        return Subject(exact_expert(gait, _folded(domain, gait, setup.demonstration)), gait)
+    rng = np.random.default_rng(setup.seed)
+    if setup.population not in POPULATIONS:
+        choices = ", ".join(POPULATIONS)
+        raise InvalidInputError(f"unknown population {setup.population!r}; choose from {choices}")
+    w_E = POPULATIONS[setup.population](rng)
+    if setup.weights is not None:
+        w_E = check_weights(np.asarray(setup.weights))
+    if setup.expert == "suboptimal":
+        made = domain.demonstrate_poorly(w_E, rng, executor)
+        return Subject(made.expert, made.gait, w_E, made.expert.mu)
+    made = domain.demonstrate(w_E, rng, _protocol(setup), executor)
+    return Subject(made.expert, made.gait, w_E, -made.optimum.folded, made.rollouts)
+
+
+def humanoid_case(
+    domain: Humanoid, setup: Setup, subject: Subject, executor: Executor | None
+) -> Case:
+    """The learner's tools for an expert that is known."""
+    from walking_irl.case import Case
+
+    case = Case(
+        domain,
+        subject,
+        domain.learner(subject.expert, THREADS),
+        measure=domain.remeasure(_protocol(setup), setup.seed, executor),
+        min_weight=MIN_WEIGHT,
+    )
     case.watch = lambda f: setattr(solver_for(domain.planar, THREADS), "watch", f)
     if setup.record is not None:
         from walking_irl.recording.gait_view import WalkerView
 
-        case.world = WalkerView(domain.walker.model, one_cycle(domain, gait))
+        case.world = WalkerView(domain.walker.model, one_cycle(domain, subject.policy))
         case.motion = lambda policy, w: one_cycle(domain, policy)
     return case
+
+
+def _protocol(setup: Setup) -> Protocol:
+    """How the expert is recorded; a demonstration and a spoilt walk are known exactly."""
+    is_exact = setup.expert == "suboptimal" or setup.demonstration is not None
+    return Protocol(0 if is_exact else setup.rollouts, setup.noise, setup.disturbance)
 
 
 def one_cycle(domain: Humanoid, gait: Gait) -> Rollout:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from walking_irl.errors import InvalidInputError, RecordingError
+from walking_irl.errors import InvalidInputError, WalkingIRLError
 from walking_irl.output import write_file
 from walking_irl.recovery import Recovery, summarise
 from walking_irl.types import Array, Expert, Iteration, Objective, Rule, Status
@@ -45,7 +45,8 @@ class Report:
         seconds: Wall time by part [s].
         recording: Path of the recording, if there is one.
         was_interrupted: Whether Ctrl-C ended it.
-        failed_write: Why the recording could not be written at the end, or None.
+        archive: Path of the file that the run can be resumed from, if there is one.
+        failed_write: Why the recording or that file could not be written, or None.
     """
 
     domain: str
@@ -61,7 +62,8 @@ class Report:
     seconds: dict[str, float] = field(default_factory=dict)
     recording: str | None = None
     was_interrupted: bool = False
-    failed_write: RecordingError | None = None
+    archive: str | None = None
+    failed_write: WalkingIRLError | None = None
 
     @property
     def last(self) -> Iteration:
@@ -153,6 +155,7 @@ class Report:
             "seconds": self.seconds,
             "history": [_entry(it) for it in self.iterations],
             "recording": self.recording,
+            "archive": self.archive,
             "versions": versions(),
         }
 
@@ -189,14 +192,15 @@ def write_json(path: Path, content: dict[str, Any]) -> None:
     Raises:
         InvalidInputError: If the file cannot be written.
     """
-    write_file(path, (json.dumps(_plain(content), indent=1, allow_nan=False) + "\n").encode())
+    write_file(path, (json.dumps(to_plain(content), indent=1, allow_nan=False) + "\n").encode())
 
 
-def _plain(value: Any) -> Any:
+def to_plain(value: Any) -> Any:
+    """A value as JSON types; numbers that are not finite become None."""
     if isinstance(value, dict):
-        return {str(k): _plain(v) for k, v in value.items()}
+        return {str(k): to_plain(v) for k, v in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(v) for v in value]
+        return [to_plain(v) for v in value]
     if isinstance(value, np.ndarray | np.generic):
-        return _plain(value.tolist())
+        return to_plain(value.tolist())
     return None if isinstance(value, float) and not math.isfinite(value) else value

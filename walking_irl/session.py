@@ -1,9 +1,4 @@
-"""One recovery from hidden weights to report: expert, learner, recording, scoring.
-
-The learner's side, :func:`~walking_irl.cpirl.cpirl` and the forward solver handed to it, receives
-the :class:`~walking_irl.types.Expert` only. Hidden weights stay in this module, for scoring and for
-the picture.
-"""
+"""One recovery from hidden weights to report: expert, learner, recording, scoring."""
 
 from __future__ import annotations
 
@@ -14,102 +9,20 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import ExitStack, contextmanager
 from copy import copy
-from dataclasses import dataclass, field
 from multiprocessing import get_context
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from walking_irl.centres import centre_rule
-from walking_irl.cpirl import MODES, cpirl
-from walking_irl.domains import load
+from walking_irl.case import Case, Setup, case_of, prepare
+from walking_irl.cpirl import cpirl
 from walking_irl.errors import InvalidInputError, RecordingError
 from walking_irl.report import Report
-from walking_irl.types import Array, Expert, Iteration, Response, Rollout, Rule
+from walking_irl.saved_run import Remembering, SavedRun, save_run
+from walking_irl.types import Array, Iteration, Response, Rule
 
 PROBE = 1e-4
 """Relative suboptimality whose extreme weights are probed at the end."""
-MAX_SOLVES = 20
-EXPERTS = ("optimal", "suboptimal")
-
-
-@dataclass(frozen=True)
-class Setup:
-    """What to recover and how; the defaults are the main job.
-
-    Attributes:
-        domain: Name of the domain.
-        centre: Key of the centre.
-        mode: Mode of CPIRL.
-        seed: Draws hidden weights and disturbances.
-        weights: Hidden weights instead of drawn ones, or None.
-        population: "typical" or "uniform" hidden weights.
-        expert: "optimal", or "suboptimal": then known exactly, whatever ``rollouts`` says.
-        rollouts: Trajectories recorded of the expert; 0 for its exact features.
-        noise: Standard deviation of their disturbance [rad/s].
-        disturbance: "initial" or "kicks".
-        demonstration: A gait file instead of a synthetic expert, or None.
-        max_solves: Budget of forward solves, probes left aside.
-        record: Where to write the recording, or None.
-    """
-
-    domain: str = "humanoid"
-    centre: str = "ac"
-    mode: str = "optimal"
-    seed: int = 0
-    weights: tuple[float, ...] | None = None
-    population: str = "typical"
-    expert: str = "optimal"
-    rollouts: int = 20
-    noise: float = 0.02
-    disturbance: str = "initial"
-    demonstration: Path | None = None
-    max_solves: int = MAX_SOLVES
-    record: Path | None = None
-
-    def __post_init__(self) -> None:
-        centre_rule(self.centre)
-        if self.mode not in MODES:
-            raise InvalidInputError(f"unknown mode {self.mode!r}; choose from {', '.join(MODES)}")
-        if self.expert not in EXPERTS:
-            choices = " or ".join(EXPERTS)
-            raise InvalidInputError(f"unknown expert {self.expert!r}; choose {choices}")
-        if self.seed < 0:
-            raise InvalidInputError(f"seed must be a whole number >= 0, got {self.seed}")
-        if self.max_solves < 1:
-            raise InvalidInputError(f"max-solves must be at least 1, got {self.max_solves}")
-
-
-@dataclass
-class Case:
-    """An expert to be explained, with what only scoring and pictures may use.
-
-    Attributes:
-        domain: The domain.
-        expert: What the learner receives.
-        forward: The learner's forward solver.
-        measure: Measures a policy as the expert was measured, or None.
-        min_weight: The learner's lower bound of every weight.
-        w_expert: Hidden weights, or None.
-        true_mu: Features of the expert's own policy without noise, or None.
-        world: What a recording shows beside the polyhedron, or None.
-        motion: Maps a policy, and the weights it is the best for, to what the world shows of it.
-        trajectories: What was recorded of the expert.
-        watch: Hands the learner's solver a function of its iteration and cost.
-    """
-
-    domain: Any
-    expert: Expert
-    forward: Callable[[Array], Response]
-    measure: Any = None
-    min_weight: float = 0.0
-    w_expert: Array | None = None
-    true_mu: Array | None = None
-    world: Any = None
-    motion: Callable[[Any, Array], Any] = field(default=lambda policy, w: None)
-    trajectories: tuple[Rollout, ...] = ()
-    watch: Callable[[Callable[[int, float], None]], None] = field(default=lambda f: None)
 
 
 @contextmanager
@@ -146,46 +59,6 @@ def _interrupts_held() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-def prepare(setup: Setup, executor: Executor | None) -> Case:
-    """Make the expert: solve for its policy, record it; or read the demonstration.
-
-    Raises:
-        InvalidInputError: If the setup asks for what there is not.
-        FallError: If a recorded expert falls.
-    """
-    domain = load(setup.domain)
-    if setup.domain.startswith("humanoid"):
-        from walking_irl.humanoid_case import humanoid_case
-
-        return humanoid_case(domain, setup, executor)
-    if setup.demonstration is not None:
-        raise InvalidInputError(f"domain {setup.domain} takes no demonstration files")
-    rng = np.random.default_rng(setup.seed)
-    K = len(domain.objectives)
-    w_E = _given(setup, K) if setup.weights else rng.dirichlet(np.ones(K))
-    if setup.expert == "optimal":
-        expert = domain.expert(w_E, rng)
-    elif hasattr(domain, "suboptimal_expert"):
-        expert = domain.suboptimal_expert(w_E, rng)
-    else:
-        raise InvalidInputError(f"domain {setup.domain} has no suboptimal expert")
-    case = Case(domain, expert, domain.forward, w_expert=w_E, true_mu=expert.mu)
-    if setup.record is not None:
-        from walking_irl.recording.worlds import world_of
-
-        case.world, case.motion = world_of(setup.domain, domain, expert.demonstration, w_E)
-    return case
-
-
-def _given(setup: Setup, n: int) -> Array:
-    w = np.asarray(setup.weights, dtype=float)
-    if w.shape != (n,):
-        raise InvalidInputError(f"{setup.domain} has {n} objectives, got {w.size} weights")
-    if not np.isfinite(w).all() or (w < 0).any() or w.sum() <= 0:
-        raise InvalidInputError(f"weights must be finite, >= 0 and not all zero, got {w.tolist()}")
-    return np.asarray(w / w.sum())
 
 
 class Stopwatch:
@@ -240,6 +113,7 @@ class TimedForward:
 def run(
     setup: Setup,
     *,
+    saved: SavedRun | None = None,
     executor: Executor | None = None,
     on_expert: Callable[[Case], None] = lambda case: None,
     on_iteration: Callable[[Iteration, Report], None] = lambda it, report: None,
@@ -252,6 +126,8 @@ def run(
 
     Args:
         setup: What to do.
+        saved: A run of the same setup to resume: its expert and its solver's answers are taken
+            from there, and every figure is computed again.
         executor: Runs independent solves side by side.
         on_expert: Called when the expert is known.
         on_iteration: Called after every iteration.
@@ -266,7 +142,12 @@ def run(
 
         check_writable(setup.record)
     with watch.part("expert"):
-        case = prepare(setup, executor)
+        if saved is None:
+            case = prepare(setup, executor)
+        else:
+            case = case_of(setup, saved.subject, executor)
+            case.forward = Remembering(case.forward, saved.answers)
+    subject = case.subject
     on_expert(case)
     report = Report(
         domain=setup.domain,
@@ -274,13 +155,14 @@ def run(
         centre=setup.centre,
         mode=setup.mode,
         seed=setup.seed if setup.weights is None and setup.demonstration is None else None,
-        w_expert=case.w_expert,
-        expert=case.expert,
-        true_mu=case.true_mu,
+        w_expert=subject.w_expert,
+        expert=subject.expert,
+        true_mu=subject.true_mu,
     )
+    n_saved = 0 if saved is None else len(saved.answers)
     try:
         try:
-            _learn(setup, case, report, watch, executor, on_iteration)
+            _learn(setup, case, report, watch, n_saved, executor, on_iteration)
         except RecordingError as error:
             if not report.iterations:
                 raise
@@ -302,6 +184,7 @@ def _learn(
     case: Case,
     report: Report,
     watch: Stopwatch,
+    n_saved: int,
     executor: Executor | None,
     on_iteration: Callable[[Iteration, Report], None],
 ) -> None:
@@ -313,18 +196,18 @@ def _learn(
             experiment = Experiment(
                 domain=setup.domain,
                 objectives=report.objectives,
-                expert=case.expert,
+                expert=case.subject.expert,
                 centre=setup.centre,
                 mode=setup.mode,
                 seed=report.seed,
-                w_expert=case.w_expert,
+                w_expert=case.subject.w_expert,
             )
             recorder = stack.enter_context(Recorder(setup.record, experiment, case.world))
             report.recording = str(setup.record)
         forward = TimedForward(case.forward)
         steps = cpirl(
             forward,
-            case.expert,
+            case.subject.expert,
             centre=setup.centre,
             mode=setup.mode,  # type: ignore[arg-type]
             max_solves=setup.max_solves,
@@ -342,6 +225,8 @@ def _learn(
             watch.seconds["forward"] += solving
             watch.seconds["centre"] += spent - solving
             report.iterations.append(it)
+            with watch.part("recording"):
+                _keep(setup, case, report, n_saved)
             on_iteration(it, report)
             if recorder is not None:
                 with watch.part("recording"):
@@ -351,6 +236,20 @@ def _learn(
             with watch.part("recording"):
                 best = _nearest(report)
                 recorder.finale(case.motion(best.response.policy, best.w))
+
+
+def _keep(setup: Setup, case: Case, report: Report, n_saved: int) -> None:
+    """Save the run so far; where that fails, the run goes on, and the report tells of it."""
+    if setup.archive is None or report.failed_write is not None:
+        return
+    report.archive = str(setup.archive)
+    if len(report.iterations) <= n_saved:  # an interrupt here must not shorten what is there
+        return
+    answers = [(it.w, it.response) for it in report.iterations]
+    try:
+        save_run(setup.archive, SavedRun(setup, case.subject, answers))
+    except InvalidInputError as error:
+        report.failed_write, report.archive = error, None
 
 
 def _nearest(report: Report) -> Iteration:

@@ -170,3 +170,11 @@ class Domain(Protocol):
     def expert(self, w_E: Array, rng: np.random.Generator) -> Expert:
         """Synthetic expert for hidden weights, solved at least as hard as any learner's query."""
         ...
+
+    def pack(self, policy: Any) -> Array:
+        """A policy as one array, for files."""
+        ...
+
+    def unpack(self, packed: Array) -> Any:
+        """Inverse of :meth:`pack`."""
+        ...

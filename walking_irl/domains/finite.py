@@ -76,6 +76,14 @@ class FiniteDomain:
         mu = self.mdp.feature_expectations(pi)
         return Expert(mu, np.zeros_like(mu), demonstration=pi)
 
+    def pack(self, policy: Actions) -> Actions:
+        """A policy as one array, for files: itself."""
+        return np.asarray(policy)
+
+    def unpack(self, packed: Actions) -> Actions:
+        """Inverse of :meth:`pack`."""
+        return packed
+
     def random_weights(self, rng: np.random.Generator) -> Array:
         """Hidden weights for experiments, uniform on the simplex, shape (K,)."""
         return rng.dirichlet(np.ones(len(self.objectives)))

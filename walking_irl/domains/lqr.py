@@ -118,6 +118,14 @@ class LQR:
         """Expert with gains up to 25 % off, if this domain perturbs none already."""
         return replace(self, perturbation=self.perturbation or SPOILT_BY).expert(w_E, rng)
 
+    def pack(self, policy: Array) -> Array:
+        """Gains as one array, for files: themselves."""
+        return np.asarray(policy)
+
+    def unpack(self, packed: Array) -> Array:
+        """Inverse of :meth:`pack`."""
+        return packed
+
     def picture(self, policy: Array, n_steps: int = 16) -> LQRPicture:
         """``n_steps`` steps under gains ``policy``, shape (K,)."""
         k = np.asarray(policy, dtype=np.float64)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from walking_irl.domains.finite import checked_weights
-from walking_irl.domains.path_model import integrate
+from walking_irl.domains.path_model import costs, integrate
 from walking_irl.domains.path_solver import Path, polished, slsqp_path, straight_start
 from walking_irl.errors import InvalidInputError, SolverError
 from walking_irl.types import Array, Expert, Objective, Response
@@ -126,6 +126,17 @@ class WalkingPath:
             paths.append(self.path(w_E * noise / SCALES, i))
         response = self._response(tuple(paths))
         return Expert(response.mu, np.zeros(len(SCALES)), demonstration=response.policy)
+
+    def pack(self, policy: tuple[Path, ...]) -> Array:
+        """Controls and durations as one array, for files, shape (n goals, 3 N + 1)."""
+        return np.array([p.z for p in policy])
+
+    def unpack(self, packed: Array) -> tuple[Path, ...]:
+        """Inverse of :meth:`pack`, but for figures of the solver."""
+        return tuple(
+            Path(z, costs(integrate(z[None]), goal)[0], None, 0)
+            for z, goal in zip(packed, self.goals, strict=True)
+        )
 
     def random_weights(self, rng: np.random.Generator) -> Array:
         """Hidden weights for experiments: half uniform weights, half uniform on the simplex.

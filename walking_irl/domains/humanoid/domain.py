@@ -140,6 +140,14 @@ class Humanoid:
         """The learner's forward solver: it starts from the demonstrated gait."""
         return Imitator(expert.demonstration, self.planar, threads)
 
+    def pack(self, policy: Gait) -> Array:
+        """A gait as one array, for files."""
+        return policy.to_vector()
+
+    def unpack(self, packed: Array) -> Gait:
+        """Inverse of :meth:`pack`."""
+        return Gait.from_vector(packed, len(self.walker.joints))
+
     def remeasure(
         self, protocol: Protocol, seed: int = 0, executor: Executor | None = None
     ) -> Remeasure | None:

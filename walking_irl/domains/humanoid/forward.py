@@ -143,6 +143,10 @@ class Imitator:
         self.archive.append((best.x, best.folded))
         return respond(solver, w, best, solutions[1:])
 
+    def recall(self, response: Response) -> None:
+        """Learn of an answer that another run has found."""
+        self.archive.append((response.policy.to_vector(), -response.mu))
+
     def _better_start(self, w: Array, cost: float) -> Array | None:
         if self.demonstrated @ w < cost * (1 - 1e-9):
             return self.start
