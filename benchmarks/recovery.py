@@ -18,6 +18,7 @@ from unittest import mock
 import numpy as np
 from bench import table, verdict
 
+from walking_irl.case import MAX_SOLVES
 from walking_irl.cpirl import cpirl
 from walking_irl.domains.humanoid import domain as domain_module
 from walking_irl.domains.humanoid import solver as gait_solver
@@ -28,7 +29,6 @@ from walking_irl.domains.humanoid.normal_equations import Factor, NormalMatrix
 from walking_irl.domains.humanoid.population import typical_weights
 from walking_irl.domains.humanoid.protocol import Protocol, measure
 from walking_irl.domains.humanoid.transcription import Transcription
-from walking_irl.case import MAX_SOLVES
 from walking_irl.humanoid_case import MIN_WEIGHT
 from walking_irl.session import PROBE
 from walking_irl.types import Expert, Iteration

@@ -8,6 +8,7 @@ from walking_irl.domains.gridworld import Gridworld
 from walking_irl.domains.lqr import LQR
 from walking_irl.errors import InvalidInputError
 from walking_irl.gauge import gauge_fixed, has_constant_sum, unidentifiable
+from walking_irl.recovery import summarise
 from walking_irl.types import Status
 
 
@@ -36,8 +37,8 @@ def test_gauge_is_seen_in_policies_and_only_where_there_is_one():
         assert unidentifiable(M).shape == (0, len(domain.objectives))
         assert not has_constant_sum(M[1:] - M[0])
     assert not has_constant_sum(np.zeros((3, 4)))
-    with pytest.raises(InvalidInputError, match="at least 9 policies"):
-        unidentifiable(macro[:8])
+    with pytest.raises(InvalidInputError, match="at least 10 policies"):
+        unidentifiable(macro[:9])
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -56,3 +57,12 @@ def test_macro_cells_are_not_matched_by_uniform_weights(seed):
     loss = w_E @ (expert.mu - run[-1].response.mu)
     # These weights explain the expert; they need not be its own.
     assert loss <= 1e-4 * (w_E @ expert.mu)
+    gauge = summarise(run, expert, domain.objectives).gauge
+    assert gauge is not None and "sum to a constant" in gauge
+
+
+def test_no_gauge_is_reported_where_there_is_none():
+    rng = np.random.default_rng(0)
+    expert = LQR(3).expert(rng.dirichlet(np.ones(3)), rng)
+    run = list(cpirl(LQR(3).forward, expert, rng=rng))
+    assert summarise(run, expert).gauge is None

@@ -185,6 +185,8 @@ def show_report(report: Report, console: Console, walks: Path | None) -> None:
         console.print(
             f"least certain: {found.weakest} (condition number {found.condition_number:.0f})"
         )
+    if found.gauge is not None:
+        console.print(f"not identifiable: {found.gauge}")
     if report.l1_error is not None:
         inside = "inside" if report.contains_expert else "NOT inside"
         console.print(f"L1 error {report.l1_error:.5f}; hidden weights {inside} the intervals")
@@ -325,7 +327,7 @@ def inspect(args: argparse.Namespace, console: Console) -> int:
     console.print(_table_of_recording(content))
     for key in (
         *("domain", "seed", "centre", "mode", "status", "ending", "rule", "certificate"),
-        *("bracket", "volume_ratio", "condition_number", "weakest", "noise"),
+        *("bracket", "volume_ratio", "condition_number", "weakest", "gauge", "noise"),
     ):
         if content[key] is not None:
             console.print(f"{key.replace('_', ' ')}: {escape(_short(content[key]))}")

@@ -7,6 +7,8 @@ a > 0. Such a set of weights is a cone with apex 1/K; a match is one only if it 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from walking_irl.errors import InvalidInputError
@@ -26,6 +28,25 @@ def has_constant_sum(D: Array) -> bool:
     return size > 0.0 and bool(np.abs(D.sum(axis=1)).max() <= SAME * D.shape[1] * size)
 
 
+def freedom_in_words(D: Array, names: Sequence[str]) -> str | None:
+    """Which changes of the weights no policy found can reveal, or None.
+
+    Args:
+        D: Differences mu_i - mu_E, shape (n, K).
+        names: Of the K features.
+
+    >>> freedom_in_words(np.array([[1.0, 0.0, 2.0]]), ["speed", "rain", "effort"])
+    'every policy found has the same rain, whose weight could be any'
+    """
+    size = np.abs(D).max(axis=0, initial=0.0)
+    if has_constant_sum(D):
+        return "all features sum to a constant: adding the same to every weight changes nothing"
+    same = [name for name, s in zip(names, size, strict=True) if s <= SAME * size.max()]
+    if not size.any() or not same:
+        return None
+    return f"every policy found has the same {', '.join(same)}, whose weight could be any"
+
+
 def gauge_fixed(w: Array) -> Array | None:
     """The weights of a ray from 1/K through ``w`` that touch a bound, shape (K,); None for 1/K.
 
@@ -41,7 +62,7 @@ def unidentifiable(M: Array) -> Array:
     """Directions of weights along which no policy found differs from another.
 
     Args:
-        M: Feature expectations of at least K policies, found for different weights, shape (n, K).
+        M: Feature expectations of more than K policies, found for different weights, shape (n, K).
 
     Returns:
         Orthonormal directions, shape (g, K); none where the behaviour depends on every weight.
@@ -50,8 +71,8 @@ def unidentifiable(M: Array) -> Array:
         InvalidInputError: If there are too few policies to tell.
     """
     n, K = M.shape
-    if n < K:
-        raise InvalidInputError(f"need at least {K} policies to look for a gauge, got {n}")
+    if n <= K:
+        raise InvalidInputError(f"need at least {K + 1} policies to look for a gauge, got {n}")
     _, size, directions = np.linalg.svd(M - M.mean(axis=0), full_matrices=True)
     found: Array = directions[np.r_[size, np.zeros(K - len(size))] <= SAME * size[0]]
     return found

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from walking_irl.errors import InvalidInputError
+from walking_irl.gauge import freedom_in_words
 from walking_irl.newton import reduced
 from walking_irl.polyhedron import WeightPolyhedron, plane_basis
 from walking_irl.types import Array, Expert, Iteration, Objective, Status
@@ -28,6 +29,7 @@ class Recovery:
         volume_ratio: Volume of the last polyhedron over the whole simplex's.
         condition_number: Of the regret's Hessian, or None where no sensitivity is known.
         weakest: The trade-off that the behaviour reveals least, or None.
+        gauge: Which changes of the weights no policy found can reveal, in words, or None.
         noise: Confidence half-widths of the expert's features, shape (K,).
         n_solves: Forward solves, probes included.
         status: Why the run ended.
@@ -42,6 +44,7 @@ class Recovery:
     volume_ratio: float
     condition_number: float | None
     weakest: str | None
+    gauge: str | None
     noise: Array
     n_solves: int
     status: Status
@@ -82,10 +85,20 @@ def summarise(
         volume_ratio=last.polyhedron.volume() / whole.volume(),
         condition_number=condition,
         weakest=weakest,
+        gauge=freedom_in_words(_differences(iterations, expert), names),
         noise=np.asarray(expert.error),
         n_solves=len(iterations),
         status=last.status,
     )
+
+
+def _differences(iterations: Sequence[Iteration], expert: Expert) -> Array:
+    """mu_i - mu_E of every policy evaluated, shape (n, K)."""
+    K = len(expert.mu)
+    found = [np.vstack([i.response.mu, i.response.evaluated.reshape(-1, K)]) for i in iterations]
+    M = np.vstack(found)
+    differences: Array = M[np.isfinite(M).all(axis=1)] - expert.mu
+    return differences
 
 
 def _identifiability(

@@ -168,6 +168,7 @@ def _summary(r: Recovery) -> dict[str, Any]:
         "volume_ratio": r.volume_ratio,
         "condition_number": r.condition_number,
         "weakest": r.weakest,
+        "gauge": r.gauge,
         "noise": r.noise.tolist(),
     }
 

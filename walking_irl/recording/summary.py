@@ -87,6 +87,8 @@ def _certainty(experiment: Experiment, found: Recovery) -> str:
             f"The behaviour tells least about **{found.weakest}** (condition number "
             f"{found.condition_number:.3g})."
         )
+    if found.gauge is not None:
+        lines.append(f"Not identifiable: {found.gauge}.")
     lines.append(noise_level(experiment.expert))
     return "\n".join(f"* {text}" for text in lines)
 
@@ -146,5 +148,6 @@ def properties(
             "volume_ratio": found.volume_ratio,
             "condition_number": found.condition_number,
             "weakest": found.weakest,
+            "gauge": found.gauge,
         }
     return {key: value for key, value in known.items() if value is not None}

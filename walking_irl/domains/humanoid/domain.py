@@ -16,6 +16,7 @@ from walking_irl.domains.humanoid.policy import tracking_policy
 from walking_irl.domains.humanoid.protocol import MANY, Measurement, Protocol, measure
 from walking_irl.domains.humanoid.rollout import averaged_gait
 from walking_irl.domains.humanoid.solver import stage
+from walking_irl.expert import expert_from_returns
 from walking_irl.types import Array, Expert, Objective, Response, Rollout
 
 SPOILT_BY = np.deg2rad(1.0)
@@ -165,11 +166,5 @@ def exact_expert(gait: Gait, folded: Array) -> Expert:
 
 def expert_from(measured: Measurement, shown: Gait) -> Expert:
     """Expert known by recorded walks: their mean with its error bars, and their mean gait."""
-    return Expert(
-        mu=-measured.mean,
-        error=measured.half_width,
-        suboptimality=SUBOPTIMALITY * float(np.mean(measured.mean)),
-        covariance=measured.covariance,
-        n_samples=len(measured.folded),
-        demonstration=shown,
-    )
+    slack = SUBOPTIMALITY * float(np.mean(measured.mean))
+    return expert_from_returns(-measured.folded, suboptimality=slack, demonstration=shown)

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy import stats
 
 from walking_irl.domains.humanoid.anatomy import load_walker
 from walking_irl.domains.humanoid.forward import run_tasks
@@ -20,7 +19,6 @@ from walking_irl.errors import InvalidInputError
 from walking_irl.types import Array, Rollout
 
 DISTURBANCES = ("initial", "kicks")
-CONFIDENCE = 0.95
 MANY = 100
 """Rollouts of a learner's gait where kicks make every cycle random; simulating is cheap."""
 
@@ -73,13 +71,6 @@ class Measurement(NamedTuple):
     def covariance(self) -> Array:
         """Covariance of the mean, shape (6, 6)."""
         return np.asarray(np.cov(self.folded.T) / len(self.folded))
-
-    @property
-    def half_width(self) -> Array:
-        """Student half-widths of the mean, jointly for all objectives (Bonferroni), shape (6,)."""
-        n, k = self.folded.shape
-        quantile = stats.t.ppf(1 - (1 - CONFIDENCE) / (2 * k), n - 1)
-        return np.asarray(quantile * np.sqrt(np.diag(self.covariance)))
 
 
 def measure(
