@@ -1,6 +1,7 @@
 import csv
 import json
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from walking_irl.experiments import TABLES, gridworld, lqr, run, run_tables, run
 from walking_irl.experiments.cutting import cutting_planes, utopia
 from walking_irl.experiments.runner import Row, Runner
 from walking_irl.experiments.table import COLUMNS
-from walking_irl.experiments.tasks import Task, run_task
+from walking_irl.experiments.tasks import Task, hidden_expert, make_domain, run_task
 from walking_irl.types import Expert
 
 CLOCKED = ("seconds", "query_seconds")
@@ -149,3 +150,49 @@ def test_output_that_is_a_file_is_named(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(InvalidInputError, match="cannot write to"):
         run_tables(["7.1"], out=tmp_path / "file")
+
+
+@pytest.mark.parametrize(("n", "solves"), [(5, 10), (8, 13)])
+def test_one_policy_dominates_every_clearly_suboptimal_regulator(n, solves):
+    """Mean solves over 10 experts by cuts alone, Algorithm 3 beside it; fewer with Newton steps."""
+    options = {"n_objectives": n, "perturbation": 0.25}
+    task = Task("lqr", options, criterion="dominance", least_advantage=0.002)
+
+    def mean_solves(method="cpirl", **arguments):
+        outcomes = [
+            run_task(replace(task, method=method, arguments=arguments, seed=s)) for s in range(10)
+        ]
+        return np.mean([o["solves"] for o in outcomes]), all(o["success"] for o in outcomes)
+
+    for centre in ("cg", "mvie"):
+        mean, is_dominated = mean_solves(centre=centre)
+        assert is_dominated and mean <= solves
+    mean, is_dominated = mean_solves(centre="ac")
+    assert is_dominated and mean <= solves + 1  # K = 8: 13.9
+    mean, is_dominated = mean_solves(centre="ac", has_newton=True)
+    assert is_dominated and mean <= 6
+    utopian, is_dominated = mean_solves("utopia", centre="ac")
+    assert utopian > 2 * mean and not is_dominated
+
+
+def test_experts_are_drawn_until_one_is_clearly_suboptimal():
+    task = Task("lqr", {"n_objectives": 3, "perturbation": 0.25}, criterion="dominance")
+    domain = make_domain("lqr", task.options)
+    for seed in range(5):
+        strict = replace(task, least_advantage=0.002, seed=seed)
+        expert, n_drawn = hidden_expert(strict, domain, np.random.default_rng(seed))[1:]
+        assert domain.advantage(expert.mu) >= 0.002 * np.abs(expert.mu).mean()
+        first, one = hidden_expert(task, domain, np.random.default_rng(seed))[1:]
+        assert one == 1 and (n_drawn == 1) == bool((first.mu == expert.mu).all())
+    optimal = domain.forward(np.array([0.2, 0.3, 0.5])).mu
+    assert domain.advantage(optimal) == pytest.approx(0.0, abs=1e-9)
+    assert domain.advantage(optimal - 1.0) == pytest.approx(1.0)
+
+
+def test_a_broken_cell_is_run_again(tmp_path):
+    task = Task("lqr", {"n_objectives": 2}, arguments={"centre": "ac"})
+    [first] = Runner(cache=tmp_path).outcomes("x", [task])
+    [cell] = tmp_path.iterdir()
+    cell.write_text(cell.read_text()[:20])
+    [again] = Runner(cache=tmp_path).outcomes("x", [task])
+    assert untimed([again]) == untimed([first])

@@ -12,6 +12,8 @@ from walking_irl.polyhedron import WeightPolyhedron
 from walking_irl.types import Array, Expert, Response
 
 CONFIDENCE = 0.95
+UNREACHED = 0.02
+"""By how much, relative to |w.mu_E|, an expert may beat every policy: noise or a local solver."""
 
 
 class Archive:
@@ -53,7 +55,8 @@ class Archive:
         """Remember a query and every policy evaluated for it.
 
         Raises:
-            InvalidInputError: If the response's ``mu`` is not finite with shape (K,).
+            InvalidInputError: If the response's ``mu`` is not finite with shape (K,), or no policy
+                comes near the expert: then its features are not what a policy can achieve.
         """
         mu = np.asarray(response.mu)
         if mu.shape != (self.K,) or not np.isfinite(mu).all():
@@ -63,6 +66,13 @@ class Archive:
         if len(response.evaluated):
             spare = np.asarray(response.evaluated, dtype=np.float64)
             self._spare = np.r_[self._spare, spare[np.isfinite(spare).all(axis=1)]]
+        best, claimed = float(self.values(w)), float(w @ (self.mu - self.error))
+        if best < claimed - UNREACHED * float(self.scale(w)):
+            raise InvalidInputError(
+                f"no policy achieves the expert's features: for the weights {np.round(w, 4)} the "
+                f"best policy's return is {best:.6g}, the expert's {claimed:.6g}; check the "
+                "features' sign, scale and discount"
+            )
 
     def values(self, w: Array) -> Array:
         """V(w) = max_i w.mu_i over all policies evaluated; (..., K) -> (...)."""

@@ -72,7 +72,8 @@ def cpirl(
         Immutable iterations; the last one's status says why the run ended.
 
     Raises:
-        InvalidInputError: If an argument is out of range.
+        InvalidInputError: If an argument is out of range, or no policy achieves the expert's
+            features.
     """
     _check(expert, mode, tol, max_solves, probe)
     is_exact = expert.covariance is None
@@ -185,5 +186,21 @@ def _check(expert: Expert, mode: str, tol: float, max_solves: int, probe: float 
         )
     if error.min() < 0.0 or expert.suboptimality < 0.0:
         raise InvalidInputError("the expert's error and suboptimality must not be negative")
+    if expert.covariance is not None:
+        _check_covariance(np.asarray(expert.covariance), error)
     if not tol > 0.0 or max_solves < 1 or (probe is not None and not probe > 0.0):
         raise InvalidInputError("tol, max_solves and probe must be positive")
+
+
+def _check_covariance(C: Array, error: Array) -> None:
+    K = len(error)
+    if C.shape != (K, K) or not np.isfinite(C).all():
+        raise InvalidInputError(f"the expert's covariance needs finite shape ({K}, {K})")
+    size = max(float(np.abs(C).max()), 1e-300)
+    if np.abs(C - C.T).max() > 1e-9 * size or np.linalg.eigvalsh(C)[0] < -1e-9 * size:
+        raise InvalidInputError("the expert's covariance must be symmetric without negative values")
+    if np.any(error < (1.0 - 1e-9) * np.sqrt(np.maximum(np.diag(C), 0.0))):
+        raise InvalidInputError(
+            "the expert's error bars are narrower than one standard error of its covariance; give "
+            "half-widths of a confidence interval, or no covariance for an exact expert"
+        )

@@ -11,8 +11,10 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import minimize
 
-from walking_irl.errors import InvalidInputError
+from walking_irl.domains.weights import checked_weights
+from walking_irl.errors import SolverError
 from walking_irl.types import Array, Expert, Objective, Response
 
 SPOILT_BY = 0.25
@@ -94,10 +96,7 @@ class LQR:
 
     def forward(self, w: Array) -> Response:
         """Optimal gains for ``w``, with d mu/d w = (d mu/d k) diag(dk/dw)."""
-        w = np.asarray(w, dtype=np.float64)
-        if w.shape != (self.n_objectives,):
-            raise InvalidInputError(f"weights must have shape ({self.n_objectives},)")
-        k, slope = self._gains_and_slopes(w)
+        k, slope = self._gains_and_slopes(checked_weights(w, self.n_objectives))
         Q, R = self._charges()
         g = self.discount
         closed = 1 - g * (1 + k) ** 2
@@ -108,7 +107,7 @@ class LQR:
 
     def expert(self, w_E: Array, rng: np.random.Generator) -> Expert:
         """Exact features of the optimal gains, perturbed where ``perturbation`` > 0."""
-        k = self.gains(np.asarray(w_E, dtype=np.float64))
+        k = self.gains(checked_weights(w_E, self.n_objectives))
         if self.perturbation > 0.0:
             k = k * (1 + self.perturbation * rng.uniform(-1.0, 1.0, len(k)))
             k = np.clip(k, -0.99, -0.1)
@@ -117,6 +116,33 @@ class LQR:
     def suboptimal_expert(self, w_E: Array, rng: np.random.Generator) -> Expert:
         """Expert with gains up to 25 % off, if this domain perturbs none already."""
         return replace(self, perturbation=self.perturbation or SPOILT_BY).expert(w_E, rng)
+
+    def advantage(self, mu: Array) -> float:
+        """v* = min_w max_pi w.(mu(pi) - mu): by how much a policy beats ``mu`` in every feature.
+
+        The regret is convex with gradient mu(w) - mu; SciPy's SLSQP minimises it on the simplex.
+
+        Raises:
+            SolverError: If it does not converge.
+        """
+        K = self.n_objectives
+
+        def regret(w: Array) -> tuple[float, Array]:
+            d = self.forward(w / w.sum()).mu - mu  # steps leave the simplex by rounding
+            return float(w @ d), d
+
+        result = minimize(
+            regret,
+            np.full(K, 1 / K),
+            jac=True,
+            bounds=[(0.0, 1.0)] * K,
+            constraints={"type": "eq", "fun": lambda w: w.sum() - 1, "jac": np.ones_like},
+            method="SLSQP",
+            options={"ftol": 1e-12, "maxiter": 200},
+        )
+        if result.status != 0:
+            raise SolverError(f"the least regret was not found: {result.message}")
+        return float(result.fun)
 
     def pack(self, policy: Array) -> Array:
         """Gains as one array, for files: themselves."""

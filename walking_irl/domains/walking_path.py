@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from walking_irl.domains.finite import checked_weights
 from walking_irl.domains.path_model import costs, integrate
 from walking_irl.domains.path_solver import Path, polished, slsqp_path, straight_start
+from walking_irl.domains.weights import checked_weights
 from walking_irl.errors import InvalidInputError, SolverError
 from walking_irl.types import Array, Expert, Objective, Response
 

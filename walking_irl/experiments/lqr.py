@@ -18,6 +18,9 @@ class Config:
         sizes: Numbers of axes, as in the authors' toolbox and beyond.
         share: 2 % of |J_E| (thesis, section 7.2).
         perturbation: Relative error of a sub-optimal expert's gains (the thesis's is unknown).
+        least_advantage: By how much some policy must beat a sub-optimal expert in every feature,
+            relative to its mean |feature|: about half of all perturbed experts are optimal for
+            other weights, within this, and no single policy clearly dominates those.
         max_solves: Budget of CPIRL and of all rivals but MWAL.
         mwal_rounds: T of MWAL, fixed in advance.
         seeds: Hidden experts per cell.
@@ -26,22 +29,24 @@ class Config:
     sizes: tuple[int, ...] = (2, 3, 5, 8)
     share: float = 0.02
     perturbation: float = 0.25
+    least_advantage: float = 0.002
     max_solves: int = 60
     mwal_rounds: int = 200
     seeds: int = 10
 
 
 def _tasks(config: Config, criterion: str) -> list[tuple[str, Task]]:
-    spread = config.perturbation if criterion == "dominance" else 0.0
+    is_poor = criterion == "dominance"
     return [
         (
             f"n={n}",
             Task(
                 "lqr",
-                {"n_objectives": n, "perturbation": spread},
+                {"n_objectives": n, "perturbation": config.perturbation if is_poor else 0.0},
                 criterion=criterion,
                 share=config.share,
                 max_solves=config.max_solves,
+                least_advantage=config.least_advantage if is_poor else 0.0,
             ),
         )
         for n in config.sizes
@@ -58,7 +63,7 @@ def centre_rows(setting: str, task: Task, centres: tuple[str, ...] = CENTRES) ->
 
 
 def dominance_rows(setting: str, task: Task, centres: tuple[str, ...] = CENTRES) -> list[Row]:
-    """A single dominating policy by levels and by Algorithm 3; a dominating mixture."""
+    """A dominating policy by levels, a dominating mixture, Algorithm 3; and with Newton steps."""
     rows = []
     for c in centres:
         level = replace(task, arguments={"centre": c})
@@ -66,7 +71,28 @@ def dominance_rows(setting: str, task: Task, centres: tuple[str, ...] = CENTRES)
         rows.append(Row(setting, f"{label} level, single policy", level))
         rows.append(Row(setting, f"{label} level, mixture", replace(level, scored="mixture")))
         rows.append(Row(setting, f"{label} Algorithm 3", replace(level, method="utopia")))
-    return rows
+    newton = replace(task, arguments={"centre": "ac", "has_newton": True})
+    return [*rows, Row(setting, "CPIRL-AC level + Newton, single policy", newton)]
+
+
+def _every_draw(setting: str, task: Task) -> list[Row]:
+    """The same for every expert drawn: those who are nearly optimal, too."""
+    every = replace(task, least_advantage=0.0)
+    return dominance_rows(f"{setting}, every draw", every, ("ac",))
+
+
+def _with_draws(table: Table) -> Table:
+    """The table, with a note on how many experts were drawn."""
+    drawn = {}
+    for run in table.raw:
+        if run["least_advantage"] > 0.0:
+            drawn[run["options"]["n_objectives"], run["seed"]] = run["drawn"]
+    counts = [
+        f"{sum(d for (m, _), d in drawn.items() if m == n)} for n={n}"
+        for n in sorted({n for n, _ in drawn})
+    ]
+    note = f"Experts drawn until enough were clearly sub-optimal: {', '.join(counts)}."
+    return replace(table, notes=(*table.notes, note))
 
 
 def table_7_3(config: Config, runner: Runner) -> Table:
@@ -86,8 +112,12 @@ def table_7_4(config: Config, runner: Runner) -> Table:
 
 def table_7_5(config: Config, runner: Runner) -> Table:
     """Centres, sub-optimal expert."""
-    rows = [row for job in _tasks(config, "dominance") for row in dominance_rows(*job)]
-    return runner.table("7.5", "LQR, sub-optimal expert, mu >= mu_E, centres", rows, config.seeds)
+    rows = []
+    for setting, task in _tasks(config, "dominance"):
+        rows += dominance_rows(setting, task)
+        rows += _every_draw(setting, task)
+    title = "LQR, sub-optimal expert, mu >= mu_E, centres"
+    return _with_draws(runner.table("7.5", title, rows, config.seeds))
 
 
 def table_7_6(config: Config, runner: Runner) -> Table:
@@ -99,7 +129,7 @@ def table_7_6(config: Config, runner: Runner) -> Table:
         rows.append(Row(setting, "CPIRL-AC level, mixture", replace(level, scored="mixture")))
         rows += rivals(setting, task, config.mwal_rounds, is_finite=False)
     title = "LQR, sub-optimal expert, mu >= mu_E, algorithms"
-    return runner.table("7.6", title, rows, config.seeds, NOTES)
+    return _with_draws(runner.table("7.6", title, rows, config.seeds, NOTES))
 
 
 NOTES = (

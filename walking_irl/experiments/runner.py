@@ -105,7 +105,10 @@ class Runner:
         path = self._path(task)
         if path is None or not path.exists():
             return None
-        outcome: dict[str, Any] = json.loads(path.read_text())
+        try:
+            outcome: dict[str, Any] = json.loads(path.read_text())
+        except ValueError:  # damaged: it is run again
+            return None
         return outcome
 
     def _keep(self, task: Task, outcome: dict[str, Any]) -> None:

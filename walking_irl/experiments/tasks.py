@@ -44,6 +44,8 @@ class Task:
         criterion: "return": J within ``share`` of J_E; "dominance": mu >= mu_E.
         share: Relative loss that counts as success.
         max_solves: Budget of forward solves.
+        least_advantage: Experts whom no policy beats by this much in every feature, relative to
+            their mean |feature|, are drawn again (LQR).
         seed: Of the expert and of the method.
     """
 
@@ -55,6 +57,7 @@ class Task:
     criterion: str = "return"
     share: float = 0.01
     max_solves: int = 60
+    least_advantage: float = 0.0
     seed: int = 0
 
     def key(self) -> dict[str, Any]:
@@ -104,8 +107,22 @@ def make_domain(name: str, options: dict[str, Any]) -> Any:
     return makers[name](**options)
 
 
-def hidden_expert(task: Task, domain: Any, rng: np.random.Generator) -> tuple[Array, Expert]:
-    """Hidden weights (K,) and an expert: optimal for "return", perturbed for "dominance"."""
+def hidden_expert(task: Task, domain: Any, rng: np.random.Generator) -> tuple[Array, Expert, int]:
+    """Hidden weights (K,), an expert, and how many were drawn for it.
+
+    The expert is optimal for "return" and perturbed for "dominance".
+    """
+    w_E, expert = _drawn(task, domain, rng)
+    n_drawn = 1
+    while task.least_advantage > 0.0 and domain.advantage(expert.mu) < (
+        task.least_advantage * np.abs(expert.mu).mean()
+    ):
+        w_E, expert = _drawn(task, domain, rng)
+        n_drawn += 1
+    return w_E, expert, n_drawn
+
+
+def _drawn(task: Task, domain: Any, rng: np.random.Generator) -> tuple[Array, Expert]:
     sample = getattr(domain, "random_weights", None)
     w_E = sample(rng) if sample else rng.dirichlet(np.ones(len(domain.objectives)))
     if task.criterion == "return" or not hasattr(domain, "suboptimal_expert"):
@@ -117,12 +134,12 @@ def run_task(task: Task) -> dict[str, Any]:
     """Run a method until it satisfies the criterion, ends or spends its budget.
 
     Returns:
-        success, solves, seconds, query_seconds, dw, certificate, width (None where undefined), and
-        the error that ended the run, if one did.
+        success, solves, seconds, query_seconds, dw, certificate, width (None where undefined),
+        experts drawn until one was sub-optimal enough, and the error that ended the run, if any.
     """
     rng = np.random.default_rng([task.seed, 7])
     domain = make_domain(task.domain, task.options)
-    w_E, expert = hidden_expert(task, domain, rng)
+    w_E, expert, n_drawn = hidden_expert(task, domain, rng)
     solver = domain.solve if isinstance(domain, FiniteDomain) else domain.forward
     domain.forward(np.full(len(w_E), 1 / len(w_E)))  # warm-up: caches and imports are not timed
     clock = _Clock(solver, bool(task.arguments.get("has_newton", False)))
@@ -146,6 +163,7 @@ def run_task(task: Task) -> dict[str, Any]:
         "dw": None if state is None or state.w is None else float(np.abs(state.w - w_E).max()),
         "certificate": certificate,
         "width": None if state is None else state.width,
+        "drawn": n_drawn,
         "error": error,
     }
 
