@@ -9,7 +9,16 @@ from problems import TWO_POLICIES
 
 from walking_irl.centres import centre_rule
 from walking_irl.errors import InvalidInputError
-from walking_irl.experiments import TABLES, gridworld, lqr, run, run_tables, runner, walking_path
+from walking_irl.experiments import (
+    TABLES,
+    gridworld,
+    humanoid,
+    lqr,
+    run,
+    run_tables,
+    runner,
+    walking_path,
+)
 from walking_irl.experiments.cutting import cutting_planes, utopia
 from walking_irl.experiments.runner import Row, Runner
 from walking_irl.experiments.table import COLUMNS
@@ -18,9 +27,15 @@ from walking_irl.types import Expert
 
 CLOCKED = ("seconds", "query_seconds")
 SMALL_GRID = gridworld.Config(
-    grids=((9, 3, 0.9),), samples=(100, 200), seeds=2, max_solves=30, mwal_rounds=20
+    grids=((9, 3, 0.9, "patches"),),
+    large=(),
+    samples=(100, 200),
+    seeds=2,
+    max_solves=30,
+    mwal_rounds=20,
 )
 SMALL_LQR = lqr.Config(sizes=(2, 3), seeds=1, mwal_rounds=20, max_solves=20)
+SMALL_WALK = humanoid.Config(max_solves=1, seeds=1, bodies=("humanoid-planar",))
 SMALL_PATH = walking_path.Config(n_intervals=6, seeds=1, max_solves=2, mwal_rounds=2)
 
 
@@ -29,7 +44,7 @@ def untimed(outcomes):
 
 
 def test_all_thesis_tables_are_there():
-    assert list(TABLES) == ["7.1", "fig7.1", *(f"7.{i}" for i in range(2, 11))]
+    assert list(TABLES) == ["7.1", "fig7.1", *(f"7.{i}" for i in range(2, 13))]
 
 
 @pytest.mark.parametrize(
@@ -41,6 +56,8 @@ def test_all_thesis_tables_are_there():
         pytest.param("7.8", SMALL_PATH, marks=pytest.mark.slow),
         pytest.param("7.9", SMALL_PATH, marks=pytest.mark.slow),
         pytest.param("7.10", SMALL_PATH, marks=pytest.mark.slow),
+        pytest.param("7.11", SMALL_WALK, marks=pytest.mark.slow),
+        pytest.param("7.12", SMALL_WALK, marks=pytest.mark.slow),
     ],
 )
 def test_every_cell_is_filled_or_says_why_not(name, config):

@@ -1,4 +1,4 @@
-"""Experiments: the thesis's tables 7.1 to 7.10 and figure 7.1, regenerated with one call."""
+"""Experiments: the thesis's tables 7.1 to 7.10 and figure 7.1, and two tables of the humanoid."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from walking_irl.errors import InvalidInputError
-from walking_irl.experiments import gridworld, lqr, walking_path
+from walking_irl.experiments import gridworld, humanoid, lqr, walking_path
 from walking_irl.experiments.runner import Progress, Runner
 from walking_irl.experiments.table import Table
 
@@ -27,6 +27,8 @@ TABLES: dict[str, tuple[Callable[[Any, Runner], Table], Any]] = {
     "7.8": (walking_path.table_7_8, walking_path.Config()),
     "7.9": (walking_path.table_7_9, walking_path.Config()),
     "7.10": (walking_path.table_7_10, walking_path.Config()),
+    "7.11": (humanoid.table_7_11, humanoid.Config()),
+    "7.12": (humanoid.table_7_12, humanoid.Config()),
 }
 """What makes each table, and its default settings."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, field
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,6 +18,9 @@ from walking_irl.cpirl import cpirl
 from walking_irl.domains.driving import Driving
 from walking_irl.domains.finite import FiniteDomain
 from walking_irl.domains.gridworld import Gridworld
+from walking_irl.domains.humanoid.domain import Humanoid
+from walking_irl.domains.humanoid.population import typical_weights
+from walking_irl.domains.humanoid.protocol import Protocol
 from walking_irl.domains.lqr import LQR
 from walking_irl.domains.walking_path import WalkingPath
 from walking_irl.errors import InvalidInputError, WalkingIRLError
@@ -28,7 +31,9 @@ DOMINANCE_TOL = 1e-9
 """Relative slack of "at least as good in every feature": rounding only."""
 
 FLOOR = 0.05
-"""Uniform share of the queries of projection and max-margin on the walking path."""
+"""Uniform share of the rivals' queries where a term of no weight leaves the optimum ill-defined."""
+MIN_WEIGHT = {"humanoid": 0.005, "humanoid-planar": 0.005}
+"""Lower bound of the learner's weights, by domain; as in the main job."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +41,7 @@ class Task:
     """A picklable job; equal tasks have equal results but for the clock.
 
     Attributes:
-        domain: "gridworld", "driving", "lqr" or "walking-path".
+        domain: "gridworld", "driving", "lqr", "walking-path", "humanoid" or "humanoid-planar".
         options: Arguments of the domain.
         method: "cpirl", "utopia", "samples", "kelley", "mwal", "projection", "max-margin", "lpal".
         arguments: Of the method (centre, has_newton, n_samples).
@@ -96,12 +101,19 @@ class _Clock:
 
 
 def make_domain(name: str, options: dict[str, Any]) -> Any:
-    """Small domain by name.
+    """Domain by name.
 
     Raises:
         InvalidInputError: If there is none.
     """
-    makers = {"gridworld": Gridworld, "driving": Driving, "lqr": LQR, "walking-path": WalkingPath}
+    makers: dict[str, Callable[..., Any]] = {
+        "gridworld": Gridworld,
+        "driving": Driving,
+        "lqr": LQR,
+        "walking-path": WalkingPath,
+        "humanoid": partial(Humanoid, planar=False),
+        "humanoid-planar": partial(Humanoid, planar=True),
+    }
     if name not in makers:
         raise InvalidInputError(f"unknown domain {name!r}; choose from {', '.join(makers)}")
     return makers[name](**options)
@@ -123,11 +135,23 @@ def hidden_expert(task: Task, domain: Any, rng: np.random.Generator) -> tuple[Ar
 
 
 def _drawn(task: Task, domain: Any, rng: np.random.Generator) -> tuple[Array, Expert]:
+    if isinstance(domain, Humanoid):
+        return _walker(domain.planar, task.criterion == "dominance", task.seed)
     sample = getattr(domain, "random_weights", None)
     w_E = sample(rng) if sample else rng.dirichlet(np.ones(len(domain.objectives)))
     if task.criterion == "return" or not hasattr(domain, "suboptimal_expert"):
         return w_E, domain.expert(w_E, rng)  # the LQR perturbs its expert by an option
     return w_E, domain.suboptimal_expert(w_E, rng)
+
+
+@lru_cache(maxsize=32)
+def _walker(planar: bool, is_spoilt: bool, seed: int) -> tuple[Array, Expert]:
+    """Hidden weights and a walker known exactly; kept, for the search takes longer than a row."""
+    domain, rng = Humanoid(planar), np.random.default_rng([seed, 7])
+    w_E = typical_weights(rng)
+    if is_spoilt:
+        return w_E, domain.demonstrate_poorly(w_E, rng).expert
+    return w_E, domain.demonstrate(w_E, rng, Protocol(rollouts=0)).expert
 
 
 def run_task(task: Task) -> dict[str, Any]:
@@ -140,10 +164,13 @@ def run_task(task: Task) -> dict[str, Any]:
     rng = np.random.default_rng([task.seed, 7])
     domain = make_domain(task.domain, task.options)
     w_E, expert, n_drawn = hidden_expert(task, domain, rng)
-    solver = domain.solve if isinstance(domain, FiniteDomain) else domain.forward
-    domain.forward(np.full(len(w_E), 1 / len(w_E)))  # warm-up: caches and imports are not timed
+    if isinstance(domain, Humanoid):
+        solver: Any = domain.learner(expert)
+    else:
+        solver = domain.solve if isinstance(domain, FiniteDomain) else domain.forward
+        domain.forward(np.full(len(w_E), 1 / len(w_E)))  # caches and imports are not timed
     clock = _Clock(solver, bool(task.arguments.get("has_newton", False)))
-    span = _span(domain, expert) if task.method == "mwal" else 0.0
+    span = _span(domain, solver, expert) if task.method == "mwal" else 0.0
     start = time.perf_counter()
     state, success, error = None, False, None
     try:
@@ -190,7 +217,15 @@ def _cpirl(task: Task, clock: _Clock, expert: Expert, rng: np.random.Generator) 
     mode: Any = "optimal" if task.criterion == "return" else "minimise"
     centre = task.arguments["centre"]
     M: list[Array] = []
-    run = cpirl(clock, expert, centre=centre, mode=mode, max_solves=task.max_solves, rng=rng)
+    run = cpirl(
+        clock,
+        expert,
+        centre=centre,
+        mode=mode,
+        max_solves=task.max_solves,
+        min_weight=MIN_WEIGHT.get(task.domain, 0.0),
+        rng=rng,
+    )
     for it in run:
         M.append(it.response.mu)
         mu = it.response.mu
@@ -227,15 +262,15 @@ def _rival(
     task: Task, domain: Any, clock: _Clock, expert: Expert, span: float, rng: np.random.Generator
 ) -> Iterator[State]:
     n, signed = task.max_solves, isinstance(domain, FiniteDomain)
+    oracle: Any = _interior(clock) if isinstance(domain, WalkingPath | Humanoid) else clock
     if task.method == "lpal":
         run: Any = [lpal(domain, expert)]
     elif task.method == "mwal":
-        run = mwal(clock, expert, span=span, max_solves=n)
+        run = mwal(oracle, expert, span=span, max_solves=n)
     elif task.method == "kelley":
-        run = kelley(clock, expert, max_solves=n)
+        run = kelley(oracle, expert, max_solves=n)
     elif task.method in ("projection", "max-margin"):
         method = projection if task.method == "projection" else max_margin
-        oracle = _interior(clock) if isinstance(domain, WalkingPath) else clock
         run = method(oracle, expert, rng=rng, max_solves=n, is_signed=signed)
     else:
         raise InvalidInputError(f"unknown method {task.method!r}")
@@ -246,14 +281,15 @@ def _rival(
 
 
 def _interior(forward: Callable[[Array], Response]) -> Callable[[Array], Response]:
-    """Solver that moves weights off the simplex's faces, where accelerations stick to bounds."""
+    """Solver that moves weights off the simplex's faces."""
     return lambda w: forward((1 - FLOOR) * w + FLOOR / len(w))
 
 
-def _span(domain: Any, expert: Expert) -> float:
+def _span(domain: Any, solver: Callable[[Array], Response], expert: Expert) -> float:
     """Bound on |mu - mu_E|: from the discount for features in [0, 1], else from the corners."""
     if isinstance(domain, FiniteDomain):
         return 1 / (1 - domain.mdp.discount)
     K = len(expert.mu)
-    corners = 0.998 * np.eye(K) + 0.002 / K
-    return 2 * float(max(np.abs(domain.forward(w).mu - expert.mu).max() for w in corners))
+    share = FLOOR if isinstance(domain, Humanoid) else 0.002
+    corners = (1 - share) * np.eye(K) + share / K
+    return 2 * float(max(np.abs(solver(w).mu - expert.mu).max() for w in corners))
