@@ -2,6 +2,7 @@ import csv
 import json
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -20,11 +21,13 @@ from walking_irl.experiments import (
     walking_path,
 )
 from walking_irl.experiments.cutting import cutting_planes, utopia
+from walking_irl.experiments.picture import solves_chart, steps_chart
 from walking_irl.experiments.runner import Row, Runner
 from walking_irl.experiments.table import COLUMNS
 from walking_irl.experiments.tasks import Task, hidden_expert, make_domain, run_task
 from walking_irl.types import Expert
 
+SVG = "{http://www.w3.org/2000/svg}"
 CLOCKED = ("seconds", "query_seconds")
 SMALL_GRID = gridworld.Config(
     grids=((9, 3, 0.9, "patches"),),
@@ -74,13 +77,40 @@ def test_every_cell_is_filled_or_says_why_not(name, config):
 
 def test_files_say_the_same_thrice(tmp_path, monkeypatch):
     monkeypatch.setitem(TABLES, "7.3", (lqr.table_7_3, SMALL_LQR))
-    markdown, sheet, content = run_tables(["7.3"], out=tmp_path / "new", seeds=1)
+    markdown, sheet, content, picture = run_tables(["7.3"], out=tmp_path / "new", seeds=1)
     table = run("7.3", SMALL_LQR, cache=tmp_path / "new" / "cells")
     rows = list(csv.reader(sheet.read_text().splitlines()))
     assert rows == [list(table.columns), *map(list, table.rows)]
     assert [tuple(r) for r in json.loads(content.read_text())["rows"]] == list(table.rows)
     assert markdown.read_text() == table.to_markdown()
     assert markdown.read_text().count("\n| n=2 |") == 5
+    words = [t.text for t in ElementTree.parse(picture).iter(f"{SVG}text")]
+    assert {"n=2", "n=3", "CPIRL-AC"} <= set(words) and words.count("CPIRL-MVIE") == 2
+
+
+def bars(svg):
+    """Widths and fills of a chart's bars."""
+    return [
+        (float(r.get("width")), r.get("fill"))
+        for r in ElementTree.fromstring(svg).iter(f"{SVG}rect")
+    ][1:]
+
+
+def test_bars_are_as_long_as_the_logarithm_of_the_solves():
+    rows = [("a", "CPIRL-AC", "10.0 +- 0.5", "3/3"), ("a", "MWAL", "100.0", "2/3"),
+            ("b", "LPAL", "n/a", "n/a")]  # fmt: skip
+    (short, ours), (long, hollow) = bars(solves_chart("title <1>", rows))
+    assert long == pytest.approx(2 * short, abs=0.2)
+    assert ours != "white" and hollow == "white"
+
+
+def test_steps_are_drawn_where_they_belong():
+    rows = [("100", "8.0", "2.0"), ("1000", "4.0", "1.0"), ("10000", "4.0", "1.0")]
+    circles = list(ElementTree.fromstring(steps_chart("title", rows)).iter(f"{SVG}circle"))
+    x = [float(c.get("cx")) for c in circles]
+    y = [float(c.get("cy")) for c in circles]
+    assert x[1] - x[0] == pytest.approx(x[2] - x[1], abs=0.2)
+    assert y[1] == y[2] > y[0]
 
 
 def test_finished_cells_are_not_run_again(tmp_path, monkeypatch):

@@ -60,7 +60,7 @@ def run_tables(
     executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> list[Path]:
-    """Write tables as Markdown, CSV and JSON; finished cells are kept in ``out/cells``.
+    """Write tables as Markdown, CSV, JSON and SVG; finished cells are kept in ``out/cells``.
 
     Args:
         names: Names of :data:`TABLES`, or "all".

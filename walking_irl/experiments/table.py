@@ -1,4 +1,4 @@
-"""Tables of results: rows of plain values, written as Markdown, CSV and JSON."""
+"""Tables of results: rows of plain values, written as Markdown, CSV, JSON and a picture."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from walking_irl.experiments.picture import solves_chart, steps_chart
 from walking_irl.report import write_json
 from walking_irl.versions import versions
 
@@ -65,14 +66,22 @@ class Table:
         csv.writer(text, lineterminator="\n").writerows([self.columns, *self.rows])
         return text.getvalue()
 
+    def picture(self) -> str:
+        """The table's main figures as SVG."""
+        title = f"Table {self.name}: {self.title}"
+        if self.columns != COLUMNS:
+            return steps_chart(self.title, [row[:3] for row in self.rows])
+        return solves_chart(title, [(*row[:2], *row[4:6]) for row in self.rows])
+
     def write(self, folder: Path) -> list[Path]:
-        """Write ``table_<name>.md``, ``.csv`` and ``.json``; returns their paths."""
+        """Write ``table_<name>.md``, ``.csv``, ``.json`` and ``.svg``; returns their paths."""
         stem = folder / f"table_{self.name.replace('.', '_')}"
-        paths = [stem.with_suffix(s) for s in (".md", ".csv", ".json")]
+        paths = [stem.with_suffix(s) for s in (".md", ".csv", ".json", ".svg")]
         _write(paths[0], self.to_markdown())
         _write(paths[1], self.to_csv())
         content = {k: getattr(self, k) for k in ("name", "title", "columns", "rows", "notes")}
         write_json(paths[2], {**content, "header": self.header, "outcomes": list(self.raw)})
+        _write(paths[3], self.picture())
         return paths
 
 

@@ -1,0 +1,119 @@
+"""Pictures of tables, as SVG: solves by method, and steps against samples."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from html import escape
+from itertools import groupby
+
+OURS, RIVAL, FAINT, INK = "#3b6fb6", "#9a9a9a", "#e2e2e2", "#222222"
+ROW, LABELS, PLOT, RESULT = 20, 250, 420, 90
+"""Height of a row; widths of labels, of the plot and of the results beside it [px]."""
+
+
+def solves_chart(title: str, rows: Sequence[Sequence[str]]) -> str:
+    """Bars of the mean number of forward solves, with standard errors, on a logarithmic axis.
+
+    Methods that did not succeed on every seed are hollow; cells without a number are left out.
+
+    Args:
+        title: Heading.
+        rows: Setting, method, solves "mean +- s.e.", success "n/N".
+    """
+    found = [
+        (s, m, *_numbers(solves), success) for s, m, solves, success in rows if solves != "n/a"
+    ]
+    most = max((mean + error for *_, mean, error, _ in found), default=1.0)
+    decades = math.log10(max(most, 10.0)) * 1.05
+
+    def x(value: float) -> float:
+        return LABELS + PLOT * math.log10(max(value, 1.0)) / decades
+
+    body, y = [], 50.0
+    for setting, group in groupby(found, key=lambda row: row[0]):
+        body.append(_text(8, y + 14, setting, weight="bold"))
+        y += ROW + 2
+        for _, method, mean, error, success in group:
+            n, total = success.split("/")
+            colour = OURS if method.startswith("CPIRL") else RIVAL
+            fill = colour if n == total else "white"
+            middle = y + ROW / 2
+            body.append(_text(LABELS - 8, middle + 4, method, anchor="end"))
+            body.append(
+                f'<rect x="{LABELS}" y="{y + 4:g}" width="{max(x(mean) - LABELS, 1.5):.1f}" '
+                f'height="{ROW - 8}" fill="{fill}" stroke="{colour}"/>'
+            )
+            body.append(_line(x(mean - error), middle, x(mean + error), middle, INK))
+            label = f"{mean:.1f}" + ("" if n == total else f" ({success})")
+            body.append(_text(x(mean + error) + 6, middle + 4, label))
+            y += ROW
+        y += 8
+    ticks = [v for v in (1, 2, 5, 10, 20, 50, 100, 200, 500) if math.log10(v) <= decades]
+    axis = [_line(x(v), 44, x(v), y, FAINT) for v in ticks]
+    axis += [_text(x(v), 38, str(v), anchor="middle") for v in ticks]
+    caption = "forward solves until success, mean and standard error; hollow: not on every seed"
+    body.append(_text(8, y + 14, caption, colour="#666666"))
+    return _svg(title, LABELS + PLOT + RESULT, y + 26, [*axis, *body])
+
+
+def steps_chart(title: str, rows: Sequence[Sequence[str]]) -> str:
+    """Mean steps and standard deviation against the number of samples, on a logarithmic axis.
+
+    Args:
+        title: Heading.
+        rows: Samples, mean, standard deviation.
+    """
+    points = [tuple(map(float, row)) for row in rows]
+    left, top, width, height = 60.0, 50.0, 560.0, 240.0
+    low, high = math.log10(points[0][0]), math.log10(max(points[-1][0], points[0][0] + 1))
+    most = 1.1 * max(mean + spread for _, mean, spread in points)
+
+    def at(samples: float, steps: float) -> tuple[float, float]:
+        return (
+            left + 30 + (width - 60) * (math.log10(samples) - low) / (high - low),
+            top + height * (1 - steps / most),
+        )
+
+    body = []
+    for step in range(0, int(most) + 1, 2):
+        y = at(points[0][0], step)[1]
+        body += [_line(left, y, left + width, y, FAINT), _text(left - 8, y + 4, str(step), "end")]
+    places = [at(samples, mean) for samples, mean, _ in points]
+    path = " ".join(f"{x:.1f},{y:.1f}" for x, y in places)
+    body.append(f'<polyline points="{path}" fill="none" stroke="{OURS}" stroke-width="2"/>')
+    for (samples, mean, spread), (x, y) in zip(points, places, strict=True):
+        body.append(_line(x, at(samples, mean - spread)[1], x, at(samples, mean + spread)[1], OURS))
+        body.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4" fill="{OURS}"/>')
+        body.append(_text(x, top + height + 18, f"{samples:g}", "middle"))
+    body.append(_text(left + width / 2, top + height + 40, "samples of hit-and-run", "middle"))
+    body.append(_text(8, top - 12, "steps, mean and standard deviation"))
+    return _svg(title, left + width + 20, top + height + 52, body)
+
+
+def _numbers(cell: str) -> tuple[float, float]:
+    """Mean and standard error of "mean +- s.e." or "mean"."""
+    mean, _, error = cell.partition(" +- ")
+    return float(mean), float(error or 0.0)
+
+
+def _svg(title: str, width: float, height: float, body: Sequence[str]) -> str:
+    head = (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:g} {height:g}" '
+        f'width="{width:g}" height="{height:g}" font-family="sans-serif" font-size="12">'
+    )
+    paper = f'<rect width="{width:g}" height="{height:g}" fill="white"/>'
+    return "\n".join([head, paper, _text(8, 20, title, weight="bold"), *body, "</svg>", ""])
+
+
+def _text(
+    x: float, y: float, text: str, anchor: str = "start", weight: str = "normal", colour: str = INK
+) -> str:
+    return (
+        f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" font-weight="{weight}" '
+        f'fill="{colour}">{escape(text)}</text>'
+    )
+
+
+def _line(x1: float, y1: float, x2: float, y2: float, colour: str) -> str:
+    return f'<line x1="{x1:.1f}" y1="{y1:.1f}" x2="{x2:.1f}" y2="{y2:.1f}" stroke="{colour}"/>'
