@@ -5,6 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from walking_irl.recording.reader import Recording, inspect_recording
@@ -49,3 +50,40 @@ def test_six_gaits_differ_in_what_they_were_weighed_for(tmp_path):
     recording = Recording(tmp_path / "gaits.rrd")
     assert recording.has_blueprint
     assert len(recording.column("/summary", "TextDocument:text").rows) == 6
+
+
+@pytest.mark.parametrize("K", ["3", "4"])
+def test_four_centres_of_one_polyhedron(tmp_path, K):
+    out = demo("four_centres.py", "--objectives", K, folder=tmp_path)
+    lines = [line.split() for line in out.splitlines()[2:-1]]
+    errors = np.array([[float(e) for e in line[1:]] for line in lines])
+    assert errors.shape[1] == 4
+    assert np.ptp(errors[0]) < 1e-5, "all centres of the whole simplex are its middle"
+    assert (errors[-1] < 0.02).all()
+    recording = Recording(tmp_path / "centres.rrd")
+    seen = [e for e in recording.entities if e.startswith("/polyhedron/all/other/")]
+    curves = [e for e in recording.entities if e.startswith("/distance/")]
+    assert len(seen) == len(curves) == 4
+    for path, column in zip(sorted(curves), np.argsort(ORDER), strict=True):
+        drawn = [row[0] for row in recording.column(path, "Scalars:scalars").rows]
+        assert np.allclose(10 ** np.array(drawn), errors[:, column], atol=1e-5)
+    content = inspect_recording(tmp_path / "centres.rrd")
+    assert content["iterations"] == len(lines) and content["ending"] is None
+
+
+ORDER = ["analytic centre", "centre of gravity", "centre of the inscribed ellipsoid",
+         "Chebyshev centre"]  # fmt: skip
+
+
+@pytest.mark.slow
+def test_a_bad_walk_is_beaten_in_every_objective(tmp_path):
+    out = demo("suboptimal_expert.py", "--planar", folder=tmp_path)
+    assert "one policy is at least as good as the expert in every feature" in out
+    rows = [
+        line.split() for line in out.splitlines() if line.endswith(" %") and "regret" not in line
+    ]
+    assert len(rows) == 6
+    for _, walker, found, *_ in rows:
+        assert float(found) <= float(walker)
+    content = inspect_recording(tmp_path / "better.rrd")
+    assert content["status"] == "dominated" and 0 < content["bracket"][0] <= content["bracket"][1]

@@ -187,7 +187,8 @@ class Guide:
         d = archive.differences()
         scale = max(float(np.abs(archive.mu).max()), 1e-300)
         if self.mode == "minimise":
-            is_above = (d >= 0.0).all(axis=1) & (d.max(axis=1) > tol * scale)
+            asked = d[: len(archive.responses)]  # of the others no policy is kept
+            is_above = (asked >= 0.0).all(axis=1) & (asked.max(axis=1) > tol * scale)
             if is_above.any():
                 return Status.DOMINATED
             if self.model is None or not self.is_exact:

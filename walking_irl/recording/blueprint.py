@@ -9,20 +9,31 @@ import rerun.blueprint as rrb
 from walking_irl.recording import style
 from walking_irl.recording.experiment import Experiment
 from walking_irl.recording.panels import Panel, panels
-from walking_irl.recording.progress_view import BARS, FIGURES, ROW, feature_path, weight_path
+from walking_irl.recording.progress_view import (
+    BARS,
+    FIGURES,
+    ROW,
+    feature_path,
+    other_path,
+    weight_path,
+)
 from walking_irl.recording.world import WorldView
 
 
 def blueprint(experiment: Experiment, world: WorldView[Any] | None) -> rrb.Blueprint:
     """World left, polyhedron right; below intervals, certificate and a short text."""
     shown = panels(experiment.names)
-    shadows = [_shadow(panel, len(shown)) for panel in shown]
+    shadows = [_shadow(panel, len(shown), is_wide=world is None) for panel in shown]
     top: list[rrb.View | rrb.Container] = [] if world is None else [world.view()]
     if shadows:
         top.append(rrb.Horizontal(*shadows, name="Weights that explain the expert"))
     shares = [[1.0], [1.0, max(0.7, 0.5 * len(shadows))]][len(top) - 1] if top else []
+    bars = [_bars(experiment), _history(experiment)]
+    if experiment.others and experiment.w_expert is not None:
+        curves = [f"/{other_path(name)}" for name in experiment.others]
+        bars.insert(0, _plots("Distance to the hidden weights (log10, L1)", curves))
     bottom = rrb.Horizontal(
-        rrb.Tabs(_bars(experiment), _history(experiment), active_tab=0),
+        rrb.Tabs(*bars, active_tab=0),
         _certificate(),
         rrb.Tabs(
             rrb.TextDocumentView(origin="/summary", name="What to look at"),
@@ -57,10 +68,10 @@ def _window(content: rrb.Container) -> rrb.Blueprint:
     )
 
 
-def _shadow(panel: Panel, n_panels: int) -> rrb.View:
+def _shadow(panel: Panel, n_panels: int, is_wide: bool) -> rrb.View:
     position, target = (2.45, 1.6, 0.62), (0.3, 0.3, -0.03)
     if panel.is_flat:
-        position, target = (0.92, 0.43, 1.85), (0.92, 0.43, 0.0)
+        position, target = (0.92, 0.43, 1.2 if is_wide else 1.85), (0.92, 0.43, 0.0)
     elif n_panels == 1:  # the regular tetrahedron
         position, target = (2.25, 1.55, 0.6), (0.42, 0.42, 0.12)
     elif n_panels > 2:  # narrow views

@@ -10,7 +10,7 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from walking_irl.errors import InvalidInputError
-from walking_irl.recording.style import PLAYBACK_RATE
+from walking_irl.recording.style import OTHERS, PLAYBACK_RATE
 from walking_irl.types import Array, Expert, Objective
 
 
@@ -26,6 +26,7 @@ class Experiment:
         mode: The loop's mode.
         seed: Seed of the experiment, or None.
         w_expert: Hidden weights where they are known, shape (K,); for the picture only.
+        others: Names of further points that every iteration shows among the weights, at most 4.
     """
 
     domain: str
@@ -35,8 +36,13 @@ class Experiment:
     mode: str = "optimal"
     seed: int | None = None
     w_expert: Array | None = None
+    others: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        if len(self.others) > len(OTHERS):
+            raise InvalidInputError(
+                f"at most {len(OTHERS)} other points have colours, got {len(self.others)}"
+            )
         K = len(self.objectives)
         for what, x in (("expert.mu", self.expert.mu), ("w_expert", self.w_expert)):
             if x is not None and np.shape(x) != (K,):

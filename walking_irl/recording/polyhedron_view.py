@@ -6,8 +6,10 @@ set, magnified by a round factor that is written on it, so that it stays visible
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 import rerun as rr
@@ -61,12 +63,23 @@ def magnification(extent: float) -> float:
     return float(power * STEPS[STEPS * power <= largest * (1 + 1e-9)].max())
 
 
+class _Point(NamedTuple):
+    """A point among the weights."""
+
+    name: str
+    w: Array
+    colour: style.Colour
+    size: float
+    """Radius [points of the screen]."""
+
+
 class PolyhedronView:
     """Logs the polyhedron of each iteration in every panel."""
 
     def __init__(self, experiment: Experiment) -> None:
         self.panels = panels(experiment.names)
         self._w_expert = experiment.w_expert
+        self._others = experiment.others
         self._before: dict[str, Hull] = {}
 
     def log_static(self, stream: rr.RecordingStream) -> None:
@@ -74,7 +87,9 @@ class PolyhedronView:
         for panel in self.panels:
             _log_frame(stream, panel)
 
-    def log_iteration(self, stream: rr.RecordingStream, clock: Clock, it: Iteration) -> None:
+    def log_iteration(
+        self, stream: rr.RecordingStream, clock: Clock, it: Iteration, others: Sequence[Array] = ()
+    ) -> None:
         """Show the polyhedron in which the query was chosen, and fade what the last cut took away.
 
         A set without interior has no vertices to draw: the picture before it stays.
@@ -88,23 +103,32 @@ class PolyhedronView:
         for panel in self.panels:
             after = hull(panel.project(vertices))
             before = self._before.get(panel.path, after)
-            self._log_panel(stream, clock, panel, it, before, after)
+            self._log_panel(stream, clock, panel, self._points(it, others), before, after)
             self._before[panel.path] = after
+
+    def _points(self, it: Iteration, others: Sequence[Array]) -> list[_Point]:
+        points = [
+            _Point("query", it.w, style.LEARNER, 4.5),
+            _Point("estimate", it.estimate, style.ESTIMATE, 5.0),
+        ]
+        if self._w_expert is not None:
+            points.append(_Point("truth", self._w_expert, style.EXPERT, 6.0))
+        shown = zip(self._others, others, style.OTHERS, strict=False)
+        return points + [
+            _Point(f"other/{rr.escape_entity_path_part(name)}", w, colour, 4.5)
+            for name, w, colour in shown
+        ]
 
     def _log_panel(
         self,
         stream: rr.RecordingStream,
         clock: Clock,
         panel: Panel,
-        it: Iteration,
+        points: Sequence[_Point],
         before: Hull,
         after: Hull,
     ) -> None:
         clock.set(stream)
-        points = {"query": it.w, "estimate": it.estimate}
-        if self._w_expert is not None:
-            points["truth"] = self._w_expert
-        places = {name: panel.project(w) for name, w in points.items()}
         lens = _lens(panel, before)
         if lens is None:
             stream.log(f"{panel.path}/lens", rr.Clear(recursive=True))
@@ -112,11 +136,12 @@ class PolyhedronView:
             _log_lens(stream, panel, lens)
         for root, see in _pictures(panel, lens):
             _log_set(stream, root, after, see)
-            for name, x in places.items():
+            for point in points:
+                x = panel.project(point.w)
                 is_seen = see is None or bool(
                     np.abs(see(x) - see.place).max() <= LENS_RADIUS * 1.001
                 )
-                _log_point(stream, f"{root}/{name}", name, x if see is None else see(x), is_seen)
+                _log_point(stream, root, point, x if see is None else see(x), is_seen)
         self._fade(stream, clock, panel, before, after, lens)
 
     def _fade(
@@ -223,13 +248,12 @@ def _longest(edges: Array) -> Array:
     return chosen
 
 
-def _log_point(stream: rr.RecordingStream, path: str, name: str, x: Array, is_seen: bool) -> None:
-    colour = {"query": style.LEARNER, "estimate": style.ESTIMATE, "truth": style.EXPERT}[name]
-    size = {"query": 4.5, "estimate": 5.0, "truth": 6.0}[name]
-    point = rr.Points3D(
-        [x] if is_seen else np.empty((0, 3)), colors=[colour], radii=rr.Radius.ui_points([size])
-    )
-    stream.log(path, point)
+def _log_point(
+    stream: rr.RecordingStream, root: str, point: _Point, x: Array, is_seen: bool
+) -> None:
+    at = [x] if is_seen else np.empty((0, 3))
+    radii = rr.Radius.ui_points([point.size])
+    stream.log(f"{root}/{point.name}", rr.Points3D(at, colors=[point.colour], radii=radii))
 
 
 def _mesh(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import rerun as rr
@@ -50,9 +51,13 @@ class ProgressView:
         for key, (label, colour) in FIGURES.items():
             _log_style(stream, f"cpirl/{key}", [label], [colour], [2.0])
             _log_style(stream, f"cpirl/log10/{key}", [label], [colour], [2.0])
+        for name, colour in zip(self._experiment.others, style.OTHERS, strict=False):
+            _log_style(stream, other_path(name), [name], [colour], [2.0])
         self._log_axes(stream)
 
-    def log_iteration(self, stream: rr.RecordingStream, clock: Clock, it: Iteration) -> None:
+    def log_iteration(
+        self, stream: rr.RecordingStream, clock: Clock, it: Iteration, others: Sequence[Array] = ()
+    ) -> None:
         """Log all figures of one iteration at its first frame."""
         clock.set(stream)
         e = self._experiment
@@ -66,6 +71,10 @@ class ProgressView:
             if value is not None and math.isfinite(value):
                 stream.log(f"cpirl/{key}", rr.Scalars(value))
                 stream.log(f"cpirl/log10/{key}", rr.Scalars(math.log10(max(value, FLOOR))))
+        if e.w_expert is not None:
+            for name, w in zip(e.others, others, strict=False):
+                distance = float(np.abs(w - e.w_expert).sum())
+                stream.log(other_path(name), rr.Scalars(math.log10(max(distance, FLOOR))))
         self._log_bars(stream, it)
         stream.log("log", rr.TextLog(line(it), level=rr.TextLogLevel.INFO))
 
@@ -124,6 +133,11 @@ class ProgressView:
 def weight_path(name: str) -> str:
     """Entity of one weight's interval."""
     return f"weights/{rr.escape_entity_path_part(name)}"
+
+
+def other_path(name: str) -> str:
+    """Entity of another point's distance to the hidden weights."""
+    return f"distance/{rr.escape_entity_path_part(name)}"
 
 
 def feature_path(name: str) -> str:

@@ -113,6 +113,11 @@ def _legend(experiment: Experiment, world: str) -> str:
         else "* **Amber bars**: what is left of each weight's interval.",
         "* **Blue** query, **green** estimate"
         + (", **red** hidden truth." if experiment.w_expert is not None else "."),
+        *(
+            [f"* Further points: {', '.join(experiment.others)}; colours as in the curves."]
+            if experiment.others
+            else []
+        ),
         "* **Certificate**: no matter which weights are true, a mixture of the policies found "
         "loses at most this much.",
     ]

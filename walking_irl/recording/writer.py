@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Generic, Self, TypeVar
@@ -18,7 +19,7 @@ from walking_irl.recording.style import PLAYBACK_RATE
 from walking_irl.recording.summary import properties, summary
 from walking_irl.recording.world import WorldView
 from walking_irl.recovery import summarise
-from walking_irl.types import Iteration
+from walking_irl.types import Array, Iteration
 
 APPLICATION_ID = "walking_irl"
 FLUSH_SECONDS = 60.0
@@ -83,11 +84,19 @@ class Recorder(Generic[Motion]):
         self._stream.flush(timeout_sec=FLUSH_SECONDS)
         return self
 
-    def iteration(self, it: Iteration, motion: Motion | None = None) -> None:
-        """Show one iteration, and the walk (or other motion) of its policy."""
+    def iteration(
+        self, it: Iteration, motion: Motion | None = None, others: Sequence[Array] = ()
+    ) -> None:
+        """Show one iteration, and the walk (or other motion) of its policy.
+
+        Args:
+            it: The iteration.
+            motion: What the world shows of its policy.
+            others: Weights of the experiment's ``others``, shape (K,) each.
+        """
         clock = Clock(self._n_frames, it.k)
-        self._progress.log_iteration(self._stream, clock, it)
-        self._polyhedron.log_iteration(self._stream, clock, it)
+        self._progress.log_iteration(self._stream, clock, it, others)
+        self._polyhedron.log_iteration(self._stream, clock, it, others)
         self._iterations.append(it)
         self._play(clock, motion, is_last=False)
 

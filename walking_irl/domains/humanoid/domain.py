@@ -15,12 +15,18 @@ from walking_irl.domains.humanoid.objectives import OBJECTIVES
 from walking_irl.domains.humanoid.policy import tracking_policy
 from walking_irl.domains.humanoid.protocol import MANY, Measurement, Protocol, measure
 from walking_irl.domains.humanoid.rollout import averaged_gait
-from walking_irl.domains.humanoid.solver import stage
+from walking_irl.domains.humanoid.solver import Solution, stage
+from walking_irl.errors import SolverError
 from walking_irl.expert import expert_from_returns
 from walking_irl.types import Array, Expert, Objective, Response, Rollout
 
 SPOILT_BY = np.deg2rad(1.0)
-TO_PHYSICS = tuple(stage(p, 12, 1e-9, tether=1.0) for p in (1e4, 1e5, 1e6))
+"""First amplitude of the shake that spoils a gait [rad]."""
+WORSE = (0.01, 0.10)
+"""By how much a spoilt gait's costs exceed the optimum, relative."""
+SPOILING = 8
+"""Most shakes until one spoils a gait by that much."""
+TO_PHYSICS = tuple(stage(p, 30, 1e-9, tether=1.0) for p in (1e4, 1e5, 1e6))
 """Makes a shaken gait physical while it stays near itself."""
 SUBOPTIMALITY = 1e-4
 """How far from optimal an expert may be, relative to its costs: what contact jumps leave open."""
@@ -127,15 +133,27 @@ class Humanoid:
             w_E: Weights of the gait that is spoilt, shape (6,).
             rng: Source of the search's hops and of the shake.
             executor: Runs independent solves side by side.
+
+        Raises:
+            SolverError: If no shake spoils it by 1 to 10 %.
         """
         search_rng, shake_rng = rng.spawn(2)
         optimum = best_gait(self.planar, w_E, search_rng, executor)
-        solver = solver_for(self.planar)
-        start = solver.shake(optimum.x, SPOILT_BY, shake_rng)
-        spoilt = solver.solve(w_E, start, TO_PHYSICS)
+        spoilt = self._spoilt(w_E, optimum, shake_rng)
         gait = Gait.from_vector(spoilt.x, len(self.walker.joints))
         expert = replace(exact_expert(gait, spoilt.folded), suboptimality=0.0)
         return Demonstration(expert, gait, optimum, ())
+
+    def _spoilt(self, w_E: Array, optimum: OptimalGait, rng: np.random.Generator) -> Solution:
+        solver, amplitude, best = solver_for(self.planar), SPOILT_BY, float(optimum.folded @ w_E)
+        for _ in range(SPOILING):
+            start = solver.shake(optimum.x, amplitude, rng)
+            spoilt = solver.solve(w_E, start, TO_PHYSICS)
+            worse = float(spoilt.folded @ w_E) / best - 1.0
+            if WORSE[0] <= worse <= WORSE[1]:
+                return spoilt
+            amplitude *= 0.7 if worse > WORSE[1] else 1.3
+        raise SolverError(f"no shake of {SPOILING} made the gait worse by 1 to 10 %")
 
     def learner(self, expert: Expert, threads: int = 1) -> Imitator:
         """The learner's forward solver: it starts from the demonstrated gait."""

@@ -1,0 +1,76 @@
+"""Four centres of one polyhedron: where each would ask next, while one of them cuts.
+
+    python demos/four_centres.py [--seed 6] [--objectives 3] [--cuts ac] [--record centres.rrd]
+
+The expert is a linear-quadratic regulator with hidden weights. One centre (--cuts) chooses the
+queries, the others watch: all four are drawn in the same shrinking polyhedron, and their distances
+to the hidden weights run below. Needs no screen; look at it with ``walking-irl view centres.rrd``.
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from walking_irl.centres import CENTRES
+from walking_irl.cpirl import cpirl
+from walking_irl.domains.lqr import LQR
+from walking_irl.errors import EmptyPolyhedronError
+from walking_irl.recording import Experiment, Recorder
+from walking_irl.types import Array, Response
+
+NAMES = {
+    "ac": "analytic centre",
+    "cg": "centre of gravity",
+    "mvie": "centre of the inscribed ellipsoid",
+    "cc": "Chebyshev centre",
+}
+MAX_SOLVES = 16
+
+
+def main() -> None:
+    """Recover the regulator's weights by cuts alone, and watch four centres."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seed", type=int, default=6, help="draws the hidden weights")
+    parser.add_argument("--objectives", type=int, default=3, choices=(3, 4), help="weights, K")
+    parser.add_argument("--cuts", default="ac", choices=list(CENTRES), help="whose queries cut")
+    parser.add_argument("--record", type=Path, default=Path("centres.rrd"), metavar="FILE.rrd")
+    args = parser.parse_args()
+
+    rng = np.random.default_rng(args.seed)
+    domain = LQR(args.objectives)
+    w_hidden = rng.dirichlet(np.ones(args.objectives))
+    expert = domain.expert(w_hidden, rng)
+
+    def forward(w: Array) -> Response:
+        return replace(domain.forward(w), sensitivity=None)  # cuts alone, no Newton steps
+
+    experiment = Experiment(
+        domain="lqr",
+        objectives=domain.objectives,
+        expert=expert,
+        centre=args.cuts,
+        seed=args.seed,
+        w_expert=w_hidden,
+        others=tuple(NAMES.values()),
+    )
+    run = cpirl(forward, expert, centre=args.cuts, max_solves=MAX_SOLVES, rng=rng)
+    print("sum of absolute errors of the weights\nsolve" + "".join(f"{c:>9s}" for c in NAMES))
+    recorder: Recorder[None] = Recorder(args.record, experiment)
+    with recorder:
+        for it in run:
+            try:
+                points = [CENTRES[key](it.polyhedron, rng=rng).w for key in NAMES]
+            except EmptyPolyhedronError:  # too thin by now: the weights are known
+                break
+            recorder.iteration(it, others=points)
+            errors = [float(np.abs(w - w_hidden).sum()) for w in points]
+            print(f"{it.k + 1:5d}" + "".join(f"{error:9.5f}" for error in errors))
+    print(f"recording: {args.record}")
+
+
+if __name__ == "__main__":
+    main()
