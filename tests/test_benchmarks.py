@@ -13,6 +13,7 @@ ROWS = {
     "centres": ["ac    3 / 20", "cc    3 / 20", "mvie  3 / 20", "cg    3 / 20"],
     "closed_loop": ["reference"],
     "environment": ["bare mj_step", "environment, policy", "rollout: policy, all recorded"],
+    "evaluated_policies": ["lqr, queries alone", "lqr, demonstration", "gridworld, iterates"],
     "forward_solver": ["gait solver, one iteration", "mujoco.minimize.least_squares"],
     "recovery": ["MuJoCo's inverse dynamics and derivatives", "linear algebra", "queries"],
 }
@@ -20,6 +21,7 @@ HEADLINES = {
     "centres": r"^ac: .* \(target >= 5\): .*\n^cc: .*\n^mvie: ",
     "closed_loop": r"^2 walks of 3 s: \d falls .*\n^pushes of 80 N: \d of 4 .*\n^pushes of 150 N: ",
     "environment": r"^policy in the loop: \d\.\d\d of .* \(target >= 0\.5\): (met|NOT MET)$",
+    "evaluated_policies": r"^lqr: \d+\.\d\d x fewer solves .*\n^gridworld: .* \(1 experts?\)$",
     "forward_solver": r"^one iteration takes .* \(target <= 2\): .*\n^it is \d+ x faster than ",
     "recovery": r"^queries take \d+\.\d% of .* \(target <= 5 %\): (met|NOT MET)$",
 }
