@@ -121,13 +121,13 @@ class Archive:
         is_lazy = np.arange(len(d)) >= len(self.responses)
         return P.cut_all(self.rows(lift)[says], is_lazy[says])
 
-    def intervals(self, lift: Array) -> Array:
+    def intervals(self, lift: Array, estimate: Array) -> Array:
         """Per-weight bounds, shape (K, 2).
 
-        Where the cuts leave nothing, the level is raised to the best regret: then the weights are
-        those for which the expert is at least as close to optimal as for the best query.
+        Where the cuts leave nothing, the level is raised to the estimate's regret: then the weights
+        are those for which the expert is at least as close to optimal as for the estimate.
         """
-        best = float(np.min(self.values(self.W) - self.W @ (self.mu + self.error)))
+        best = float(self.values(estimate) - estimate @ (self.mu + self.error))
         for level in (0.0, max(best, 0.0), max(best, 0.0) + 1e-6 * float(np.abs(self.mu).max())):
             try:
                 return self.polyhedron(np.maximum(lift, level)).intervals()

@@ -151,7 +151,7 @@ def progress_line(it: Iteration, report: Report) -> str:
     width = float(np.diff(it.intervals).max())
     solver = it.response.info.get("iterations")
     detail = f", {solver} solver iterations" if solver else ""
-    rule = {Rule.CENTRE: "centre", Rule.NEWTON: "newton", Rule.PROBE: "probe "}[it.rule]
+    rule = f"{it.rule.name.lower():6s}"
     scale = abs(float(it.w @ report.expert.mu))
     return (
         f"  {it.k + 1:3d} {rule}  regret {100 * it.regret / scale:9.5f} %  "

@@ -167,7 +167,7 @@ def _intervals(guide: Guide, decision: Decision, probe: float | None) -> Array:
         lift = guide.lift()
         if probe is not None:
             lift = np.maximum(lift, probe * np.abs(archive.mu))
-        return archive.intervals(lift)
+        return archive.intervals(lift, decision.estimate)
     assert archive.covariance is not None
     half = archive.quantile(1) * standard_errors(guide.model.B, archive.covariance)
     w = decision.estimate

@@ -14,7 +14,7 @@ from walking_irl.certificates import game_lp
 from walking_irl.errors import EmptyPolyhedronError, FlatPolyhedronError
 from walking_irl.gauge import SAME, gauge_fixed
 from walking_irl.newton import Step, newton_step, reduced, standard_errors, with_secants
-from walking_irl.polyhedron import WeightPolyhedron
+from walking_irl.polyhedron import WeightPolyhedron, feasible
 from walking_irl.types import Array, Rule, Status
 
 Mode = Literal["optimal", "set", "minimise"]
@@ -117,7 +117,7 @@ class Guide:
             decision = self._newton(rule)
             if decision is not None:
                 return decision
-        return self._next_centre()
+        return self._kelley() or self._next_centre()
 
     def _relative_regrets(self) -> Array:
         W = self.archive.W
@@ -300,12 +300,35 @@ class Guide:
         self.model = self._fit()
         return True
 
+    def _kelley(self) -> Decision | None:
+        """Where the policies found leave the least regret, if the newest is one that was known.
+
+        Levels shrink towards the minimum for ever where few policies meet in it; there the policies
+        that are known either close the gap or are joined by a new one.
+        """
+        archive = self.archive
+        M, W = archive.M, archive.W
+        if self.mode != "minimise" or not len(M[:-1]):
+            return None
+        if np.abs(M[:-1] - M[-1]).max(axis=1).min() > 1e-12 * float(np.abs(archive.mu).max()):
+            return None
+        w = feasible(game_lp(archive.differences()).w, archive.min_weight)
+        if np.abs(W - w).max(axis=1).min() <= 1e-9:
+            return None
+        return Decision(w, Rule.KELLEY, self._estimate(), Status.CUT)
+
     def _next_centre(self) -> Decision:
         """Centre of the polyhedron, or the status that says why there is none."""
         try:
             w = self._centre(self.polyhedron(), rng=self.rng).w
-        except FlatPolyhedronError:
-            return Decision(None, Rule.CENTRE, self._estimate(), Status.GAP_CLOSED)
+        except FlatPolyhedronError:  # all that is left is about one point, or one face
+            left = game_lp(self.archive.differences()).w
+            w = (
+                self._estimate()
+                if self.model is not None
+                else feasible(left, self.archive.min_weight)
+            )
+            return Decision(None, Rule.CENTRE, w, Status.GAP_CLOSED)
         except EmptyPolyhedronError:
             t = game_lp(self.archive.differences()).value
             dominates = t < -1e-8 * float(np.abs(self.archive.mu).max())

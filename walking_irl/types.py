@@ -101,6 +101,7 @@ class Rule(enum.Enum):
 
     CENTRE = "centre of the polyhedron"
     NEWTON = "Newton step on the regret"
+    KELLEY = "least regret that the policies found leave"
     PROBE = "predicted extreme of the tolerance set"
 
 
