@@ -19,7 +19,8 @@ from walking_irl.centres import CENTRES
 from walking_irl.cpirl import cpirl
 from walking_irl.domains.lqr import LQR
 from walking_irl.errors import EmptyPolyhedronError
-from walking_irl.recording import Experiment, Recorder
+from walking_irl.polyhedron import WeightPolyhedron
+from walking_irl.recording import Experiment, Other, Recorder
 from walking_irl.types import Array, Response
 
 NAMES = {
@@ -48,6 +49,11 @@ def main() -> None:
     def forward(w: Array) -> Response:
         return replace(domain.forward(w), sensitivity=None)  # cuts alone, no Newton steps
 
+    def seen(key: str, P: WeightPolyhedron) -> Other:
+        """A centre, and which share of the volume its query would leave."""
+        w = CENTRES[key](P, rng=rng).w
+        return Other(w, P.cut(domain.forward(w).mu - expert.mu).volume() / P.volume())
+
     experiment = Experiment(
         domain="lqr",
         objectives=domain.objectives,
@@ -60,15 +66,19 @@ def main() -> None:
     run = cpirl(forward, expert, centre=args.cuts, max_solves=MAX_SOLVES, rng=rng)
     print("sum of absolute errors of the weights\nsolve" + "".join(f"{c:>9s}" for c in NAMES))
     recorder: Recorder[None] = Recorder(args.record, experiment)
+    shares = []
     with recorder:
         for it in run:
             try:
-                points = [CENTRES[key](it.polyhedron, rng=rng).w for key in NAMES]
+                points = [seen(key, it.polyhedron) for key in NAMES]
             except EmptyPolyhedronError:  # too thin by now: the weights are known
                 break
             recorder.iteration(it, others=points)
-            errors = [float(np.abs(w - w_hidden).sum()) for w in points]
+            errors = [float(np.abs(point.w - w_hidden).sum()) for point in points]
             print(f"{it.k + 1:5d}" + "".join(f"{error:9.5f}" for error in errors))
+            shares.append([point.share for point in points])
+    means = np.exp(np.mean(np.log(shares), axis=0))
+    print("volume that a query leaves, geometric mean\n     " + "".join(f"{v:9.5f}" for v in means))
     print(f"recording: {args.record}")
 
 

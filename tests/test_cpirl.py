@@ -4,6 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from problems import TWO_POLICIES, without_sensitivity
+from scipy.optimize import minimize
 
 from walking_irl.cpirl import cpirl
 from walking_irl.domains.lqr import LQR
@@ -140,6 +141,37 @@ def test_set_mode_returns_weights_that_explain_the_expert():
     assert run[-1].status is Status.MATCHED
     assert run[-1].regret <= 1e-3 * abs(run[-1].w @ expert.mu)
     assert all(i.polyhedron.contains(w_E) for i in run)
+
+
+def test_set_mode_probes_to_the_exact_interval_of_each_weight():
+    w_E, rng = hidden(3, 3)
+    problem, level = LQR(3), 1e-3
+    expert = problem.expert(w_E, rng)
+    run = list(
+        cpirl(without_sensitivity(problem), expert, mode="set", tol=level, probe=level, rng=rng)
+    )
+    probes = [i for i in run if i.rule is Rule.PROBE]
+    assert 6 < len(probes) <= 60 and run[-1].status is Status.MATCHED
+    assert all(i.status in (Status.CUT, Status.PROBE) for i in run[:-1])
+
+    def slack(w):
+        w = np.abs(w) / np.abs(w).sum()
+        return level * w @ np.abs(expert.mu) - w @ (problem.forward(w).mu - expert.mu)
+
+    for j in range(3):
+        for side, sign in ((0, 1.0), (1, -1.0)):
+            best = minimize(
+                lambda w, j=j, sign=sign: sign * w[j],
+                w_E,
+                bounds=[(0, 1)] * 3,
+                constraints=[
+                    {"type": "eq", "fun": lambda w: w.sum() - 1},
+                    {"type": "ineq", "fun": slack},
+                ],
+                method="SLSQP",
+                options={"ftol": 1e-10},
+            )
+            assert run[-1].intervals[j, side] == pytest.approx(best.x[j], abs=2e-3)
 
 
 def test_probes_tighten_intervals_around_the_truth_and_use_the_executor():

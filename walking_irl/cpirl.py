@@ -28,6 +28,8 @@ from walking_irl.stopping import StopRule
 from walking_irl.types import Array, Expert, Forward, Iteration, Response, Rule, Status
 
 MODES: tuple[Mode, ...] = ("optimal", "set", "minimise")
+MOST_PROBES, REACHED = 15, 1.02
+"""Probes of one bound in "set" mode, and the share of the level at which it counts as reached."""
 INTERVAL_FLOOR = 0.002
 """Added to the standard errors of estimated weights: what secants leave of the Hessian's error."""
 
@@ -64,8 +66,8 @@ def cpirl(
         measure: Maps a policy to the mean (K,) and covariance (K, K) of its features when measured
             as an estimated expert's were; the difference to its ``mu`` corrects the expert.
         executor: Solves the probes side by side.
-        probe: Relative tolerance whose extreme weights are solved for at the end (2K solves), or
-            None for no probes.
+        probe: Relative tolerance whose extreme weights are solved for at the end, or None for no
+            probes: one solve for each of the 2K bounds, in "set" mode until each bound is reached.
         stop: Further stop rules.
 
     Yields:
@@ -100,7 +102,10 @@ def cpirl(
         is_last = decision.w is None and (probe is None or not _may_probe(decision.status))
         yield replace(iteration, status=decision.status if is_last else Status.CUT)
     if probe is not None and _may_probe(decision.status):
-        yield from _probe(forward, guide, decision, len(history), probe, executor)
+        if mode == "set":
+            yield from _probe_exactly(forward, guide, decision, len(history), probe)
+        else:
+            yield from _probe(forward, guide, decision, len(history), probe, executor)
 
 
 def _may_probe(status: Status) -> bool:
@@ -131,6 +136,34 @@ def _probe(
         status = decision.status if i == len(queries) - 1 else Status.PROBE
         now = decision._replace(status=status)
         yield _iteration(guide, k + i, P, query, Rule.PROBE, response, now, probe)
+
+
+def _probe_exactly(
+    forward: Forward, guide: Guide, decision: Decision, k: int, probe: float
+) -> Iterator[Iteration]:
+    """Cut at each end of each interval until the weights there are as good as the tolerance says.
+
+    The intervals are then those of {f <= probe |w.mu_E|}, not only of planes around it.
+    """
+    archive = guide.archive
+    lift = np.maximum(guide.lift(), probe * np.abs(archive.mu))
+    held: Iteration | None = None
+    for direction in np.vstack([np.eye(archive.K), -np.eye(archive.K)]):
+        for _ in range(MOST_PROBES):
+            P = archive.polyhedron(lift)
+            w = P.support(direction)[1]
+            if np.abs(archive.W - w).max(axis=1).min() <= 1e-9:
+                break
+            response = forward(w)
+            archive.add(w, response)
+            if held is not None:
+                yield replace(held, status=Status.PROBE)
+            held = _iteration(guide, k, P, w, Rule.PROBE, response, decision, probe)
+            k += 1
+            if held.regret <= REACHED * probe * float(archive.scale(w)):
+                break
+    if held is not None:
+        yield held
 
 
 def _iteration(

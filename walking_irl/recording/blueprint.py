@@ -14,26 +14,33 @@ from walking_irl.recording.progress_view import (
     FIGURES,
     ROW,
     feature_path,
-    other_path,
+    distance_path,
+    share_path,
     weight_path,
 )
 from walking_irl.recording.world import WorldView
 
 
 def blueprint(experiment: Experiment, world: WorldView[Any] | None) -> rrb.Blueprint:
-    """World left, polyhedron right; below intervals, certificate and a short text."""
+    """World left, polyhedron right; below intervals, certificate and a short text.
+
+    Curves of further points stand in the world's place where there is none, else in a tab.
+    """
     shown = panels(experiment.names)
-    shadows = [_shadow(panel, len(shown), is_wide=world is None) for panel in shown]
-    top: list[rrb.View | rrb.Container] = [] if world is None else [world.view()]
-    if shadows:
-        top.append(rrb.Horizontal(*shadows, name="Weights that explain the expert"))
-    shares = [[1.0], [1.0, max(0.7, 0.5 * len(shadows))]][len(top) - 1] if top else []
-    bars = [_bars(experiment), _history(experiment)]
-    if experiment.others and experiment.w_expert is not None:
-        curves = [f"/{other_path(name)}" for name in experiment.others]
-        bars.insert(0, _plots("Distance to the hidden weights (log10, L1)", curves))
+    shadows = [_shadow(panel, len(shown)) for panel in shown]
+    curves = _others(experiment)
+    beside = [rrb.Vertical(*curves)] if curves else []
+    left: list[rrb.View | rrb.Container] = [world.view()] if world is not None else [*beside]
+    share = 1.8 if world is None else max(0.7, 0.5 * len(shadows))
+    right = [rrb.Horizontal(*shadows, name="Weights that explain the expert")] if shadows else []
+    top = [*left, *right]
     bottom = rrb.Horizontal(
-        rrb.Tabs(*bars, active_tab=0),
+        rrb.Tabs(
+            _bars(experiment),
+            _history(experiment),
+            *([] if world is None else curves),
+            active_tab=0,
+        ),
         _certificate(),
         rrb.Tabs(
             rrb.TextDocumentView(origin="/summary", name="What to look at"),
@@ -44,7 +51,8 @@ def blueprint(experiment: Experiment, world: WorldView[Any] | None) -> rrb.Bluep
         ),
         column_shares=[1.15, 1.0, 1.0],
     )
-    rows = [rrb.Horizontal(*top, column_shares=shares), bottom] if top else [bottom]
+    columns = ([1.0] if left else []) + ([share] if right else [])
+    rows = [rrb.Horizontal(*top, column_shares=columns), bottom] if top else [bottom]
     return _window(rrb.Vertical(*rows, row_shares=[1.75, 1.0][: len(rows)]))
 
 
@@ -68,10 +76,10 @@ def _window(content: rrb.Container) -> rrb.Blueprint:
     )
 
 
-def _shadow(panel: Panel, n_panels: int, is_wide: bool) -> rrb.View:
+def _shadow(panel: Panel, n_panels: int) -> rrb.View:
     position, target = (2.45, 1.6, 0.62), (0.3, 0.3, -0.03)
     if panel.is_flat:
-        position, target = (0.92, 0.43, 1.2 if is_wide else 1.85), (0.92, 0.43, 0.0)
+        position, target = (0.92, 0.43, 1.85), (0.92, 0.43, 0.0)
     elif n_panels == 1:  # the regular tetrahedron
         position, target = (2.25, 1.55, 0.6), (0.42, 0.42, 0.12)
     elif n_panels > 2:  # narrow views
@@ -129,6 +137,18 @@ def _plots(name: str, curves: list[str]) -> rrb.View:
         background=rrb.archetypes.PlotBackground(color=style.PAPER, show_grid=False),
         plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
     )
+
+
+def _others(experiment: Experiment) -> list[rrb.View]:
+    """Curves of the further points."""
+    if not experiment.others:
+        return []
+    views = [_plots("Share of the volume that a query there leaves",
+                    [f"/{share_path(name)}" for name in experiment.others])]  # fmt: skip
+    if experiment.w_expert is not None:
+        paths = [f"/{distance_path(name)}" for name in experiment.others]
+        views.insert(0, _plots("Distance to the hidden weights (log10, L1)", paths))
+    return views
 
 
 def _whole_run() -> rrb.TimeAxis:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import rerun as rr
@@ -12,6 +13,15 @@ from numpy.typing import NDArray
 from walking_irl.errors import InvalidInputError
 from walking_irl.recording.style import OTHERS, PLAYBACK_RATE
 from walking_irl.types import Array, Expert, Objective
+
+
+class Other(NamedTuple):
+    """A further point among the weights, beside the query."""
+
+    w: Array
+    """Shape (K,)."""
+    share: float | None = None
+    """Share of the polyhedron's volume that a query there leaves, where it is known."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +36,7 @@ class Experiment:
         mode: The loop's mode.
         seed: Seed of the experiment, or None.
         w_expert: Hidden weights where they are known, shape (K,); for the picture only.
-        others: Names of further points that every iteration shows among the weights, at most 4.
+        others: Names of further points, at most 4, that every iteration shows in the query's place.
     """
 
     domain: str

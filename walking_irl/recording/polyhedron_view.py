@@ -19,7 +19,7 @@ from scipy.spatial import cKDTree
 from walking_irl.errors import EmptyPolyhedronError
 from walking_irl.recording import style
 from walking_irl.recording.drawing import text_3d
-from walking_irl.recording.experiment import Clock, Experiment
+from walking_irl.recording.experiment import Clock, Experiment, Other
 from walking_irl.recording.hulls import Hull, faces_lost, hull
 from walking_irl.recording.panels import Panel, panels
 from walking_irl.types import Array, Iteration
@@ -32,6 +32,9 @@ CLEAR_EDGES, MOST_EDGES = 40, 90
 """Edges from which lines become thinner, and the most that are drawn."""
 CUT_ALPHA, CUT_EDGE = 0.42, 2.6
 """Opacity of what the newest cut took away, and width of its edges, before it fades."""
+KEY_FLAT = ((0.0, 0.87, 0.0), (0.0, -0.13, 0.0))
+KEY_SOLID = ((0.95, -0.18, 0.95), (0.0, 0.0, -0.14))
+"""Where the first name of further points stands, and from there the next one."""
 STEPS = np.array([1.0, 2.0, 3.0, 5.0, 7.0])
 """Magnifications are these times powers of ten."""
 
@@ -86,9 +89,11 @@ class PolyhedronView:
         """Log frames, names and styles."""
         for panel in self.panels:
             _log_frame(stream, panel)
+            if self._others and len(self.panels) == 1:
+                _log_key(stream, panel, self._others)
 
     def log_iteration(
-        self, stream: rr.RecordingStream, clock: Clock, it: Iteration, others: Sequence[Array] = ()
+        self, stream: rr.RecordingStream, clock: Clock, it: Iteration, others: Sequence[Other] = ()
     ) -> None:
         """Show the polyhedron in which the query was chosen, and fade what the last cut took away.
 
@@ -106,18 +111,17 @@ class PolyhedronView:
             self._log_panel(stream, clock, panel, self._points(it, others), before, after)
             self._before[panel.path] = after
 
-    def _points(self, it: Iteration, others: Sequence[Array]) -> list[_Point]:
+    def _points(self, it: Iteration, others: Sequence[Other]) -> list[_Point]:
         points = [
             _Point("query", it.w, style.LEARNER, 4.5),
             _Point("estimate", it.estimate, style.ESTIMATE, 5.0),
         ]
+        if self._others:
+            shown = zip(self._others, others, style.OTHERS, strict=False)
+            points = [_Point(other_path(name), o.w, colour, 6.5) for name, o, colour in shown]
         if self._w_expert is not None:
             points.append(_Point("truth", self._w_expert, style.EXPERT, 6.0))
-        shown = zip(self._others, others, style.OTHERS, strict=False)
-        return points + [
-            _Point(f"other/{rr.escape_entity_path_part(name)}", w, colour, 4.5)
-            for name, w, colour in shown
-        ]
+        return points
 
     def _log_panel(
         self,
@@ -207,6 +211,21 @@ def _log_frame(stream: rr.RecordingStream, panel: Panel) -> None:
     stream.log(f"{panel.path}/frame", lines, static=True)
     tips = text_3d(panel.tips, list(panel.labels))
     stream.log(f"{panel.path}/names", tips, static=True)
+
+
+def other_path(name: str) -> str:
+    """Entity of a further point, below a picture of the polyhedron."""
+    return f"other/{rr.escape_entity_path_part(name)}"
+
+
+def _log_key(stream: rr.RecordingStream, panel: Panel, names: Sequence[str]) -> None:
+    """Names of the further points beside the frame, left of it as the view opens."""
+    first, step = KEY_FLAT if panel.is_flat else KEY_SOLID
+    at = np.array(first) + np.outer(np.arange(len(names)), step)
+    radii = rr.Radius.ui_points([6.5])
+    dots = rr.Points3D(at, colors=style.OTHERS[: len(names)], radii=radii)
+    stream.log(f"{panel.path}/key", dots, static=True)
+    stream.log(f"{panel.path}/key/names", text_3d(at, list(names)), static=True)
 
 
 def _log_lens(stream: rr.RecordingStream, panel: Panel, lens: Lens) -> None:

@@ -10,7 +10,7 @@ import rerun as rr
 
 from walking_irl.recording import style
 from walking_irl.recording.drawing import text_2d
-from walking_irl.recording.experiment import Clock, Experiment
+from walking_irl.recording.experiment import Clock, Experiment, Other
 from walking_irl.types import Array, Iteration
 
 ROW = 0.105
@@ -52,11 +52,12 @@ class ProgressView:
             _log_style(stream, f"cpirl/{key}", [label], [colour], [2.0])
             _log_style(stream, f"cpirl/log10/{key}", [label], [colour], [2.0])
         for name, colour in zip(self._experiment.others, style.OTHERS, strict=False):
-            _log_style(stream, other_path(name), [name], [colour], [2.0])
+            for path in (distance_path(name), share_path(name)):
+                _log_style(stream, path, [name], [colour], [2.0])
         self._log_axes(stream)
 
     def log_iteration(
-        self, stream: rr.RecordingStream, clock: Clock, it: Iteration, others: Sequence[Array] = ()
+        self, stream: rr.RecordingStream, clock: Clock, it: Iteration, others: Sequence[Other] = ()
     ) -> None:
         """Log all figures of one iteration at its first frame."""
         clock.set(stream)
@@ -71,10 +72,12 @@ class ProgressView:
             if value is not None and math.isfinite(value):
                 stream.log(f"cpirl/{key}", rr.Scalars(value))
                 stream.log(f"cpirl/log10/{key}", rr.Scalars(math.log10(max(value, FLOOR))))
-        if e.w_expert is not None:
-            for name, w in zip(e.others, others, strict=False):
-                distance = float(np.abs(w - e.w_expert).sum())
-                stream.log(other_path(name), rr.Scalars(math.log10(max(distance, FLOOR))))
+        for name, other in zip(e.others, others, strict=True):
+            if other.share is not None:
+                stream.log(share_path(name), rr.Scalars(other.share))
+            if e.w_expert is not None:
+                distance = float(np.abs(other.w - e.w_expert).sum())
+                stream.log(distance_path(name), rr.Scalars(math.log10(max(distance, FLOOR))))
         self._log_bars(stream, it)
         stream.log("log", rr.TextLog(line(it), level=rr.TextLogLevel.INFO))
 
@@ -135,9 +138,14 @@ def weight_path(name: str) -> str:
     return f"weights/{rr.escape_entity_path_part(name)}"
 
 
-def other_path(name: str) -> str:
-    """Entity of another point's distance to the hidden weights."""
+def distance_path(name: str) -> str:
+    """Entity of a further point's distance to the hidden weights."""
     return f"distance/{rr.escape_entity_path_part(name)}"
+
+
+def share_path(name: str) -> str:
+    """Entity of the share of the volume that a query at a further point leaves."""
+    return f"share/{rr.escape_entity_path_part(name)}"
 
 
 def feature_path(name: str) -> str:

@@ -15,7 +15,7 @@ POLYHEDRON: Colour = (240, 160, 30)
 POLYHEDRON_EDGE: Colour = (176, 102, 0)
 CUT: Colour = (226, 50, 50)
 """What the newest cut took away."""
-OTHERS: tuple[Colour, ...] = ((28, 98, 190), (140, 60, 180), (0, 150, 160), (150, 90, 30))
+OTHERS: tuple[Colour, ...] = ((28, 98, 190), (160, 60, 200), (16, 150, 90), (40, 44, 52))
 """Further points among the weights, in their order."""
 FRAME: Colour = (150, 154, 162)
 INK: Colour = (92, 96, 106)

@@ -111,13 +111,12 @@ def _legend(experiment: Experiment, world: str) -> str:
         "away glows **red**. The box below magnifies it."
         if has_body
         else "* **Amber bars**: what is left of each weight's interval.",
-        "* **Blue** query, **green** estimate"
-        + (", **red** hidden truth." if experiment.w_expert is not None else "."),
-        *(
-            [f"* Further points: {', '.join(experiment.others)}; colours as in the curves."]
+        (
+            f"* **Points**: {', '.join(experiment.others)}, coloured as their curves are"
             if experiment.others
-            else []
-        ),
+            else "* **Blue** query, **green** estimate"
+        )
+        + (", **red** hidden truth." if experiment.w_expert is not None else "."),
         "* **Certificate**: no matter which weights are true, a mixture of the policies found "
         "loses at most this much.",
     ]

@@ -11,7 +11,7 @@ import rerun as rr
 
 from walking_irl.errors import RecordingError
 from walking_irl.recording.blueprint import blueprint, motion_blueprint
-from walking_irl.recording.experiment import Clock, Experiment
+from walking_irl.recording.experiment import Clock, Experiment, Other
 from walking_irl.recording.files import check_writable, write_atomically
 from walking_irl.recording.polyhedron_view import PolyhedronView
 from walking_irl.recording.progress_view import ProgressView
@@ -19,7 +19,7 @@ from walking_irl.recording.style import PLAYBACK_RATE
 from walking_irl.recording.summary import properties, summary
 from walking_irl.recording.world import WorldView
 from walking_irl.recovery import summarise
-from walking_irl.types import Array, Iteration
+from walking_irl.types import Iteration
 
 APPLICATION_ID = "walking_irl"
 FLUSH_SECONDS = 60.0
@@ -85,14 +85,14 @@ class Recorder(Generic[Motion]):
         return self
 
     def iteration(
-        self, it: Iteration, motion: Motion | None = None, others: Sequence[Array] = ()
+        self, it: Iteration, motion: Motion | None = None, others: Sequence[Other] = ()
     ) -> None:
         """Show one iteration, and the walk (or other motion) of its policy.
 
         Args:
             it: The iteration.
             motion: What the world shows of its policy.
-            others: Weights of the experiment's ``others``, shape (K,) each.
+            others: The experiment's ``others``, in their order.
         """
         clock = Clock(self._n_frames, it.k)
         self._progress.log_iteration(self._stream, clock, it, others)
