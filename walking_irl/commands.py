@@ -180,7 +180,8 @@ def show_report(report: Report, console: Console, walks: Path | None) -> None:
     console.print(f"certificate {report.last.certificate:.2e} (return that some mixture may lose)")
     found = report.recovery
     low, high = found.bracket
-    console.print(f"the expert is suboptimal by {low:.1e} to {high:.1e}")
+    span = f"{low:.1e} to {high:.1e}" if low > 0.0 else f"at most {high:.1e}"
+    console.print(f"the expert is suboptimal by {span} (return, under its most favourable weights)")
     if found.weakest is not None:
         console.print(
             f"least certain: {found.weakest} (condition number {found.condition_number:.0f})"
