@@ -3,8 +3,9 @@
     python demos/four_centres.py [--seed 6] [--objectives 3] [--cuts ac] [--record centres.rrd]
 
 The expert is a linear-quadratic regulator with hidden weights. One centre (--cuts) chooses the
-queries, the others watch: all four are drawn in the same shrinking polyhedron, and their distances
-to the hidden weights run below. Needs no screen; look at it with ``walking-irl view centres.rrd``.
+queries, the others watch: all four are drawn in the same shrinking polyhedron, beside them how far
+each is from the hidden weights, and which share of the volume its query would leave. Needs no
+screen; look at the recording with ``walking-irl view centres.rrd``.
 """
 
 from __future__ import annotations

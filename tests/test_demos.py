@@ -55,7 +55,8 @@ def test_six_gaits_differ_in_what_they_were_weighed_for(tmp_path):
 @pytest.mark.parametrize("K", ["3", "4"])
 def test_four_centres_of_one_polyhedron(tmp_path, K):
     out = demo("four_centres.py", "--objectives", K, folder=tmp_path)
-    lines = [line.split() for line in out.splitlines()[2:-1]]
+    lines = [line.split() for line in out.splitlines() if line.strip()[:1].isdigit()]
+    lines, means = lines[:-1], np.array(lines[-1], float)
     errors = np.array([[float(e) for e in line[1:]] for line in lines])
     assert errors.shape[1] == 4
     assert np.ptp(errors[0]) < 1e-5, "all centres of the whole simplex are its middle"
@@ -67,6 +68,11 @@ def test_four_centres_of_one_polyhedron(tmp_path, K):
     for path, column in zip(sorted(curves), np.argsort(ORDER), strict=True):
         drawn = [row[0] for row in recording.column(path, "Scalars:scalars").rows]
         assert np.allclose(10 ** np.array(drawn), errors[:, column], atol=1e-5)
+    n = int(K) - 1
+    gravity = next(e for e in recording.entities if e.startswith("/share/") and "gravity" in e)
+    left = [row[0] for row in recording.column(gravity, "Scalars:scalars").rows]
+    assert max(left) <= 1 - (n / (n + 1)) ** n + 1e-6, "Gruenbaum's bound"
+    assert np.exp(np.mean(np.log(left))) == pytest.approx(means[1], abs=1e-5)
     content = inspect_recording(tmp_path / "centres.rrd")
     assert content["iterations"] == len(lines) and content["ending"] is None
 

@@ -13,8 +13,8 @@ from walking_irl.recording.progress_view import (
     BARS,
     FIGURES,
     ROW,
-    feature_path,
     distance_path,
+    feature_path,
     share_path,
     weight_path,
 )
@@ -27,7 +27,7 @@ def blueprint(experiment: Experiment, world: WorldView[Any] | None) -> rrb.Bluep
     Curves of further points stand in the world's place where there is none, else in a tab.
     """
     shown = panels(experiment.names)
-    shadows = [_shadow(panel, len(shown)) for panel in shown]
+    shadows = [_shadow(panel, len(shown), bool(experiment.others)) for panel in shown]
     curves = _others(experiment)
     beside = [rrb.Vertical(*curves)] if curves else []
     left: list[rrb.View | rrb.Container] = [world.view()] if world is not None else [*beside]
@@ -76,12 +76,16 @@ def _window(content: rrb.Container) -> rrb.Blueprint:
     )
 
 
-def _shadow(panel: Panel, n_panels: int) -> rrb.View:
+def _shadow(panel: Panel, n_panels: int, is_wide: bool) -> rrb.View:
     position, target = (2.45, 1.6, 0.62), (0.3, 0.3, -0.03)
     if panel.is_flat:
         position, target = (0.92, 0.43, 1.85), (0.92, 0.43, 0.0)
+        if is_wide:
+            position, target = (0.75, 0.4, 1.3), (0.75, 0.4, 0.0)
     elif n_panels == 1:  # the regular tetrahedron
         position, target = (2.25, 1.55, 0.6), (0.42, 0.42, 0.12)
+        if is_wide:
+            position, target = (1.68, 1.44, 0.81), (0.41, 0.645, 0.48)
     elif n_panels > 2:  # narrow views
         position = (3.0, 2.0, 0.75)
     up = (0.0, 1.0, 0.0) if panel.is_flat else (0.0, 0.0, 1.0)
@@ -143,8 +147,17 @@ def _others(experiment: Experiment) -> list[rrb.View]:
     """Curves of the further points."""
     if not experiment.others:
         return []
-    views = [_plots("Share of the volume that a query there leaves",
-                    [f"/{share_path(name)}" for name in experiment.others])]  # fmt: skip
+    views = [
+        rrb.TimeSeriesView(
+            origin="/",
+            contents=[f"/{share_path(name)}" for name in experiment.others],
+            name="Share of the volume that a query there leaves",
+            axis_x=_whole_run(),
+            axis_y=rrb.ScalarAxis(range=(0.0, 1.0)),
+            background=rrb.archetypes.PlotBackground(color=style.PAPER, show_grid=False),
+            plot_legend=rrb.PlotLegend(visible=False),
+        )
+    ]
     if experiment.w_expert is not None:
         paths = [f"/{distance_path(name)}" for name in experiment.others]
         views.insert(0, _plots("Distance to the hidden weights (log10, L1)", paths))

@@ -27,11 +27,17 @@ from walking_irl.types import Array, Iteration
 LENS_RADIUS = 0.32
 LENS_CENTRE = np.array([-0.2, -0.2, -0.72])
 """Where the lens stands, relative to the middle of the frame's foot."""
+WIDE_LENS = np.array([0.05, 1.22, 0.5])
+"""Where it stands beside the tetrahedron of four weights, in a view that is wide."""
 LABEL_DROP = 1.25 * LENS_RADIUS
 CLEAR_EDGES, MOST_EDGES = 40, 90
 """Edges from which lines become thinner, and the most that are drawn."""
-CUT_ALPHA, CUT_EDGE = 0.42, 2.6
-"""Opacity of what the newest cut took away, and width of its edges, before it fades."""
+SET_ALPHA, CUT_ALPHA, CUT_EDGE = 0.28, 0.42, 2.6
+"""Opacity of the set and of what the newest cut took away, and width of its edges, at first."""
+THIN = 0.4
+"""Share of these opacities where further points inside must keep their colours."""
+ABOVE = 0.02
+"""Height of points over a flat set, which would hide half of them."""
 KEY_FLAT = ((0.0, 0.87, 0.0), (0.0, -0.13, 0.0))
 KEY_SOLID = ((0.95, -0.18, 0.95), (0.0, 0.0, -0.14))
 """Where the first name of further points stands, and from there the next one."""
@@ -83,6 +89,7 @@ class PolyhedronView:
         self.panels = panels(experiment.names)
         self._w_expert = experiment.w_expert
         self._others = experiment.others
+        self._density = THIN if experiment.others else 1.0
         self._before: dict[str, Hull] = {}
 
     def log_static(self, stream: rr.RecordingStream) -> None:
@@ -118,7 +125,7 @@ class PolyhedronView:
         ]
         if self._others:
             shown = zip(self._others, others, style.OTHERS, strict=False)
-            points = [_Point(other_path(name), o.w, colour, 6.5) for name, o, colour in shown]
+            points = [_Point(other_path(name), o.w, colour, 5.5) for name, o, colour in shown]
         if self._w_expert is not None:
             points.append(_Point("truth", self._w_expert, style.EXPERT, 6.0))
         return points
@@ -133,19 +140,21 @@ class PolyhedronView:
         after: Hull,
     ) -> None:
         clock.set(stream)
-        lens = _lens(panel, before)
+        lens = _lens(panel, before, is_wide=bool(self._others) and len(self.panels) == 1)
         if lens is None:
             stream.log(f"{panel.path}/lens", rr.Clear(recursive=True))
         else:
             _log_lens(stream, panel, lens)
+        lifted = np.array([0.0, 0.0, ABOVE if panel.is_flat else 0.0])
         for root, see in _pictures(panel, lens):
-            _log_set(stream, root, after, see)
+            _log_set(stream, root, after, see, self._density)
             for point in points:
                 x = panel.project(point.w)
                 is_seen = see is None or bool(
                     np.abs(see(x) - see.place).max() <= LENS_RADIUS * 1.001
                 )
-                _log_point(stream, root, point, x if see is None else see(x), is_seen)
+                at = x if see is None else see(x)
+                _log_point(stream, root, point, at + lifted, is_seen)
         self._fade(stream, clock, panel, before, after, lens)
 
     def _fade(
@@ -165,7 +174,7 @@ class PolyhedronView:
             at, strips = before.points, edges
             if see is not None:
                 at, strips = see(at), see(strips)
-            stream.log(f"{root}/cut", _mesh(at, faces, style.CUT, CUT_ALPHA))
+            stream.log(f"{root}/cut", _mesh(at, faces, style.CUT, self._density * CUT_ALPHA))
             glow = rr.LineStrips3D(
                 strips, colors=[style.CUT], radii=rr.Radius.ui_points([CUT_EDGE])
             )
@@ -173,7 +182,7 @@ class PolyhedronView:
             for step in range(1, style.FADE_STEPS):  # only what changes, for a small file
                 clock.set(stream, step * style.FADE_FRAMES // style.FADE_STEPS)
                 left = 1.0 - step / style.FADE_STEPS
-                faded = style.with_alpha(style.CUT, CUT_ALPHA * left)
+                faded = style.with_alpha(style.CUT, self._density * CUT_ALPHA * left)
                 stream.log(f"{root}/cut", rr.Mesh3D.from_fields(albedo_factor=faded))
                 # lines are always opaque: they shrink, then vanish
                 thinner = rr.LineStrips3D.from_fields(radii=rr.Radius.ui_points([CUT_EDGE * left]))
@@ -190,7 +199,7 @@ def _pictures(panel: Panel, lens: Lens | None) -> list[tuple[str, Lens | None]]:
     return true_scale if lens is None else [*true_scale, (f"{panel.path}/lens", lens)]
 
 
-def _lens(panel: Panel, before: Hull) -> Lens | None:
+def _lens(panel: Panel, before: Hull, is_wide: bool) -> Lens | None:
     """A lens about the set, or None while that fills much of the frame by itself."""
     focus = (before.points.max(axis=0) + before.points.min(axis=0)) / 2
     extent = float(np.abs(before.points - focus).max())
@@ -201,6 +210,8 @@ def _lens(panel: Panel, before: Hull) -> Lens | None:
     place = np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]]) + LENS_CENTRE
     if panel.is_flat:
         place = np.array([high[0] + 1.4 * LENS_RADIUS, (low[1] + high[1]) / 2, 0.0])
+    elif is_wide:
+        place = WIDE_LENS
     return Lens(focus, place, zoom)
 
 
@@ -244,12 +255,16 @@ def _log_lens(stream: rr.RecordingStream, panel: Panel, lens: Lens) -> None:
     stream.log(f"{panel.path}/lens/scale", text_3d(foot[None], [f"magnified {lens.zoom:,.0f} x"]))
 
 
-def _log_set(stream: rr.RecordingStream, root: str, body: Hull, see: Lens | None) -> None:
+def _log_set(
+    stream: rr.RecordingStream, root: str, body: Hull, see: Lens | None, density: float
+) -> None:
     points, edges = body.points, body.edges
     if see is not None:
         points, edges = see(points), see(edges)
     if len(body.triangles):
-        stream.log(f"{root}/set", _mesh(points, body.triangles, style.POLYHEDRON, 0.28))
+        stream.log(
+            f"{root}/set", _mesh(points, body.triangles, style.POLYHEDRON, density * SET_ALPHA)
+        )
     else:
         stream.log(f"{root}/set", rr.Clear(recursive=False))
     edges = _longest(edges)
