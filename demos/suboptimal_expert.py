@@ -52,7 +52,7 @@ def compare(report: Report) -> int:
         for objective, a, b in zip(report.objectives, costs, -best.response.mu, strict=True):
             print(f"{objective.name:12s}{a:9.4f}{b:9.4f}{100 * (a - b) / a:8.1f} %")
     low, high = report.recovery.bracket
-    print(f"some policy beats the walker by {low:.4f} to {high:.4f} in every scaled cost")
+    print(f"the best mixture of gaits beats the walker by {low:.4f} to {high:.4f} in every cost")
     print(f"recording: {report.recording}")
     return 0 if report.is_success else 1
 

@@ -196,8 +196,12 @@ class Guide:
                     np.min(archive.values(archive.W) - archive.W @ (archive.mu + archive.error))
                 )
                 t = game_lp(d).value
-                if f + t <= tol * scale:
-                    return Status.MIXTURE_DOMINATES if t < -tol * scale else Status.GAP_CLOSED
+                has_mixture = t < -tol * scale
+                # Near the minimum features err by the gap's square root: for one policy to beat
+                # the expert as the mixture does, the gap must close relative to its advantage.
+                unit = -t if has_mixture and self.is_exact else scale
+                if f + t <= tol * unit:
+                    return Status.MIXTURE_DOMINATES if has_mixture else Status.GAP_CLOSED
             return None
         w: Array | None = archive.W[-1]
         if archive.has_gauge() and not archive.is_match()[-1]:
