@@ -123,6 +123,38 @@ def suboptimality_from_restarts(w: Array, mu: Array, restarts: Sequence[Response
     return max(0.0, max(float(w @ r.mu) for r in restarts) - float(w @ mu))
 
 
+def check_expert(expert: Expert) -> None:
+    """What an algorithm asks of an expert before it starts.
+
+    Raises:
+        InvalidInputError: If the features or their error bars are not finite, of one shape and
+            non-negative, or contradict the covariance.
+    """
+    mu, error = np.asarray(expert.mu), np.asarray(expert.error)
+    if mu.ndim != 1 or error.shape != mu.shape or not np.isfinite(np.r_[mu, error]).all():
+        raise InvalidInputError(
+            f"the expert needs finite mu and error of one shape (K,), got {mu.shape}, {error.shape}"
+        )
+    if error.min() < 0.0 or expert.suboptimality < 0.0:
+        raise InvalidInputError("the expert's error and suboptimality must not be negative")
+    if expert.covariance is not None:
+        _check_covariance(np.asarray(expert.covariance), error)
+
+
+def _check_covariance(C: Array, error: Array) -> None:
+    K = len(error)
+    if C.shape != (K, K) or not np.isfinite(C).all():
+        raise InvalidInputError(f"the expert's covariance needs finite shape ({K}, {K})")
+    size = max(float(np.abs(C).max()), 1e-300)
+    if np.abs(C - C.T).max() > 1e-9 * size or np.linalg.eigvalsh(C)[0] < -1e-9 * size:
+        raise InvalidInputError("the expert's covariance must be symmetric without negative values")
+    if np.any(error < (1.0 - 1e-9) * np.sqrt(np.maximum(np.diag(C), 0.0))):
+        raise InvalidInputError(
+            "the expert's error bars are narrower than one standard error of its covariance; give "
+            "half-widths of a confidence interval, or no covariance for an exact expert"
+        )
+
+
 def _returns(returns: Array) -> Array:
     returns = np.asarray(returns, dtype=np.float64)
     if returns.ndim != 2 or len(returns) < 2 or not np.isfinite(returns).all():
