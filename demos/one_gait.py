@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 
-from walking_irl.commands import png
+from walking_irl.commands.gait import png
 from walking_irl.domains.humanoid.domain import Humanoid
 from walking_irl.domains.humanoid.gait import Gait, whole_cycle
 from walking_irl.domains.humanoid.objectives import REFERENCE_WEIGHTS

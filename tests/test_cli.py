@@ -12,8 +12,10 @@ import time
 import numpy as np
 import pytest
 
-from walking_irl import __version__, commands
+from walking_irl import __version__
 from walking_irl.cli import main
+from walking_irl.commands import recover
+from walking_irl.commands.view import SCREENS
 from walking_irl.domains.humanoid.domain import Humanoid
 from walking_irl.domains.humanoid.files import load_gait, save_gait
 from walking_irl.domains.humanoid.gait import whole_cycle
@@ -367,7 +369,7 @@ def test_unreadable_recordings(complaint, tmp_path, recording, command, what):
 
 
 def test_viewer_without_a_screen_names_the_way_out(complaint, recording, monkeypatch):
-    for name in commands.SCREENS:
+    for name in SCREENS:
         monkeypatch.delenv(name, raising=False)
     assert "--png" in complaint("view", recording)
 
@@ -502,7 +504,7 @@ def test_interrupt_keeps_what_is_done(call, tmp_path, monkeypatch):
             raise KeyboardInterrupt
         return "line"
 
-    monkeypatch.setattr(commands, "progress_line", third_time)
+    monkeypatch.setattr(recover, "progress_line", third_time)
     code, out, err = call("recover", "--domain", "lqr", "--json", "out.json")
     assert code == 130 and not err and "interrupted" in out
     content = json.loads((tmp_path / "out.json").read_text())

@@ -5,11 +5,12 @@ import json
 import numpy as np
 import pytest
 
-from walking_irl import commands
-from walking_irl.case import Setup, prepare
+from walking_irl.case import Setup
 from walking_irl.cli import main
+from walking_irl.commands import recover
 from walking_irl.domains import DOMAINS
 from walking_irl.errors import InvalidInputError
+from walking_irl.preparation import prepare
 from walking_irl.recording.reader import inspect_recording
 from walking_irl.saved_run import Remembering, SavedRun, load_run, save_run
 
@@ -75,7 +76,7 @@ def test_the_archive_is_whole_after_every_solve(call, tmp_path, monkeypatch):
             raise KeyboardInterrupt
         return "line"
 
-    monkeypatch.setattr(commands, "progress_line", look)
+    monkeypatch.setattr(recover, "progress_line", look)
     code, out, _ = call("--domain", "lqr")
     assert code == 130 and known == [1, 2, 3, 4]
     assert "recover --resume walking.archive.npz" in out

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from walking_irl.case import Case, Setup, prepare
+from walking_irl.case import Case, Setup
 from walking_irl.cpirl import cpirl
 from walking_irl.domains import DOMAINS, load
 from walking_irl.domains.driving import Driving, DrivingPicture
+from walking_irl.preparation import prepare
 from walking_irl.recording import Experiment, Recorder, style
 from walking_irl.recording.drawing import outline
 from walking_irl.recording.driving_view import FRAMES_PER_STEP, LAST_STEPS, Road, headline, play

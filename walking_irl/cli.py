@@ -16,6 +16,7 @@ import sys
 from collections.abc import Sequence
 from concurrent.futures import BrokenExecutor
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import NoReturn
 
@@ -61,25 +62,20 @@ def build_parser() -> argparse.ArgumentParser:
     tables.add_argument("--seeds", type=int, help="hidden experts per cell")
     tables.add_argument("--out", type=Path, default=Path("tables"), help="folder (%(default)s)")
     tables.add_argument("--quiet", action="store_true", help="print the files' names only")
-    tables.set_defaults(run="tables")
     inspect = sub.add_parser("inspect", help="print what a recording holds")
     inspect.add_argument("file", type=Path, metavar="FILE.rrd")
     inspect.add_argument("--json", type=Path, metavar="FILE.json", help="write it as JSON, too")
-    inspect.set_defaults(run="inspect")
     view = sub.add_parser("view", help="open a recording in the viewer, or render it to a picture")
     view.add_argument("file", type=Path, metavar="FILE.rrd")
     view.add_argument(
         "--png", type=Path, metavar="FILE.png", help="render a picture without a screen instead"
     )
     view.add_argument("--frame", type=int, help="frame to render (default: the last)")
-    view.set_defaults(run="view")
-    domains = sub.add_parser("domains", help="list domains, their objectives and solvers")
-    domains.set_defaults(run="domains")
+    sub.add_parser("domains", help="list domains, their objectives and solvers")
     return parser
 
 
 def _recover_parser(p: argparse.ArgumentParser) -> None:
-    p.set_defaults(run="recover")
     setting = partial(p.add_argument, default=argparse.SUPPRESS)  # Setup has the defaults
     setting("--domain", help="see walking-irl domains (humanoid)")
     setting("--centre", help="query point: ac, cg, mvie or cc (ac)")
@@ -129,7 +125,6 @@ def _gait_parser(p: argparse.ArgumentParser) -> None:
     p.add_argument("--png", type=Path, metavar="FILE.png", help="draw a picture strip")
     p.add_argument("--json", type=Path, metavar="FILE.json", help="write the gait's figures")
     p.add_argument("--quiet", action="store_true", help="print nothing but errors")
-    p.set_defaults(run="gait")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -157,10 +152,8 @@ def _run(argv: Sequence[str]) -> int:
     args = build_parser().parse_args(argv)
     from rich.console import Console  # heavy imports here: Ctrl-C is heard during them, too
 
-    from walking_irl import commands
-
-    console = Console(highlight=False, soft_wrap=True)
-    return int(getattr(commands, args.run)(args, console))
+    command = import_module(f"walking_irl.commands.{args.command}")
+    return int(command.run(args, Console(highlight=False, soft_wrap=True)))
 
 
 def _joined(argv: Sequence[str]) -> list[str]:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from concurrent.futures import Executor
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from walking_irl.case import Case, Setup, Subject
 from walking_irl.domains.humanoid.domain import Humanoid, exact_expert
 from walking_irl.domains.humanoid.files import load_gait
 from walking_irl.domains.humanoid.forward import check_weights, solver_for
@@ -16,9 +16,6 @@ from walking_irl.domains.humanoid.population import POPULATIONS
 from walking_irl.domains.humanoid.protocol import Protocol
 from walking_irl.errors import InvalidInputError
 from walking_irl.types import Rollout
-
-if TYPE_CHECKING:
-    from walking_irl.case import Case, Setup, Subject
 
 THREADS = 2
 """Threads of one learner's solve: solves follow one another, so the cores would idle."""
@@ -30,8 +27,6 @@ PHYSICAL = 0.05
 
 def humanoid_subject(domain: Humanoid, setup: Setup, executor: Executor | None) -> Subject:
     """The expert that a setup asks for."""
-    from walking_irl.case import Subject
-
     if setup.demonstration is not None:
         gait = load_gait(setup.demonstration, domain.walker)
         return Subject(exact_expert(gait, _folded(domain, gait, setup.demonstration)), gait)
@@ -53,8 +48,6 @@ def humanoid_case(
     domain: Humanoid, setup: Setup, subject: Subject, executor: Executor | None
 ) -> Case:
     """The learner's tools for an expert that is known."""
-    from walking_irl.case import Case
-
     case = Case(
         domain,
         subject,

@@ -14,9 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from walking_irl.case import Case, Setup, case_of, prepare
+from walking_irl.case import Case, Setup
 from walking_irl.cpirl import cpirl
 from walking_irl.errors import InvalidInputError, RecordingError
+from walking_irl.preparation import case_of, prepare
 from walking_irl.report import Report
 from walking_irl.saved_run import Remembering, SavedRun, save_run
 from walking_irl.types import Array, Iteration, Response, Rule

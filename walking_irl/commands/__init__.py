@@ -1,0 +1,1 @@
+"""The commands, one file each: ``run`` takes parsed arguments and a console, returns a code."""

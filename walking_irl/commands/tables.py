@@ -1,0 +1,27 @@
+"""``walking-irl tables``: the experiments, as files."""
+
+from __future__ import annotations
+
+import argparse
+
+from rich.console import Console
+from rich.markup import escape
+
+from walking_irl.session import workers
+
+
+def run(args: argparse.Namespace, console: Console) -> int:
+    """``walking-irl tables``."""
+    from walking_irl.experiments import run_tables
+
+    def progress(name: str, done: int, total: int) -> None:
+        if not args.quiet:
+            console.print(f"table {name}: {done} of {total} runs")
+
+    with workers() as executor:
+        paths = run_tables(
+            args.names, seeds=args.seeds, out=args.out, executor=executor, progress=progress
+        )
+    for path in paths:
+        console.print(escape(str(path)))
+    return 0
