@@ -6,8 +6,9 @@ from scipy.optimize import linprog
 from walking_irl import certificates as cert
 from walking_irl.centres import CENTRES
 from walking_irl.cpirl import cpirl
+from walking_irl.domains.lqr import LQR
 from walking_irl.errors import InvalidInputError
-from walking_irl.polyhedron import WeightPolyhedron
+from walking_irl.polyhedron import WeightPolyhedron, plane_basis
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -33,7 +34,7 @@ def test_every_bound_holds_on_random_menus(seed):
             break
         U = cert.single_policy_bounds(P, D)
         assert np.all(losses <= U + tol)
-        assert game.value <= U.min() + tol
+        assert cert.least_certificate(P, D) - tol <= game.value <= U.min() + tol
         assert U[-1] <= cert.radius_bound(P, it.w, d, float(it.w @ d)) + tol
         assert game.value <= cert.volume_bound(D, P.volume() / simplex.volume()) + tol
         lo, hi = P.intervals().T
@@ -117,11 +118,11 @@ def test_two_policies_mix_to_dominate_their_counterexample():
     assert game.value == pytest.approx(-0.1)
 
 
-def gravity_queries(menu, mu_E, level, rng):
-    """Queries at centres of gravity and what they find, each cut at the level."""
+def queries(menu, mu_E, level, rng, centre="cg"):
+    """Queries at centres and what they find, each cut at the level."""
     P = WeightPolyhedron.simplex(len(mu_E))
     while True:
-        w = CENTRES["cg"](P, rng=rng).w
+        w = CENTRES[centre](P, rng=rng).w
         d = menu.forward(w).mu - mu_E
         yield w, d
         P = P.cut(d - level)
@@ -132,17 +133,34 @@ def hidden_expert(rng, K):
     return menu, menu.expert(rng.dirichlet(np.ones(K))).mu
 
 
+@pytest.mark.parametrize("centre", ["ac", "cg", "mvie"])
 @pytest.mark.parametrize("accuracy", [0.1, 0.01])
 @pytest.mark.parametrize("K", [3, 4, 5])
-def test_certificate_falls_within_the_iteration_bound(K, accuracy):
+def test_certificate_falls_within_the_iteration_bound(K, accuracy, centre):
     rng = np.random.default_rng(K)
     menu, mu_E = hidden_expert(rng, K)
     rows = []
-    for _, d in gravity_queries(menu, mu_E, 0.0, rng):
+    for _, d in queries(menu, mu_E, 0.0, rng, centre):
         rows.append(d)
         if cert.game_lp(rows).value <= accuracy * np.max(rows):
             break
-        assert len(rows) < cert.iteration_bound(K, accuracy, "cg")
+        assert len(rows) < cert.iteration_bound(K, accuracy, centre)
+
+
+@pytest.mark.parametrize("K", [2, 3, 5])
+def test_distance_of_the_weights_follows_from_regret_and_curvature(K):
+    rng = np.random.default_rng(K)
+    domain, w_E = LQR(K), 0.5 * rng.dirichlet(np.ones(K)) + 0.5 / K
+    expert = domain.expert(w_E, rng)
+    U = plane_basis(K)
+    samples = [w_E, *rng.dirichlet(np.ones(K), 200)]
+    # V is separable and convex: its curvature over the simplex is least at some query.
+    least = min(
+        float(np.linalg.eigvalsh(U.T @ domain.forward(w).sensitivity @ U)[0]) for w in samples
+    )
+    for w in samples:
+        f = max(float(w @ (domain.forward(w).mu - expert.mu)), 0.0)
+        assert np.linalg.norm(w - w_E) <= cert.curvature_bound(f, 0.95 * least) + 1e-9
 
 
 @pytest.mark.parametrize("accuracy", [0.1, 0.01])
@@ -151,7 +169,7 @@ def test_regret_reaches_a_level_within_the_level_bound(K, accuracy):
     rng = np.random.default_rng(K)
     menu, mu_E = hidden_expert(rng, K)
     level = accuracy * max(float((menu.M @ e).max() - mu_E @ e) for e in np.eye(K))
-    for n_cuts, (w, d) in enumerate(gravity_queries(menu, mu_E, level, rng)):
+    for n_cuts, (w, d) in enumerate(queries(menu, mu_E, level, rng)):
         if w @ d <= level:
             break
         assert n_cuts + 1 <= cert.level_bound(K, accuracy)
@@ -160,10 +178,28 @@ def test_regret_reaches_a_level_within_the_level_bound(K, accuracy):
 def test_iteration_bounds_match_their_closed_form():
     assert cert.iteration_bound(5, 0.1, "cg") == pytest.approx(20.9, abs=0.1)
     assert cert.iteration_bound(5, 0.1, "mvie") == pytest.approx(56.2, abs=0.1)
+    assert cert.iteration_bound(5, 0.1, "ac") == pytest.approx(1.7e5, rel=0.05)
+    assert cert.iteration_bound(5, 0.01, "ac") == pytest.approx(2e7, rel=0.2)
     with pytest.raises(InvalidInputError, match="no iteration bound"):
-        cert.iteration_bound(5, 0.1, "ac")
+        cert.iteration_bound(5, 0.1, "cc")
+
+
+@pytest.mark.parametrize("K", [2, 4, 8])
+def test_beyond_the_analytic_bound_its_inequality_fails(K):
+    """Theorem A2: every k that violates the inequality is a bound."""
+    n, accuracy = K - 1, 0.1
+    alpha = accuracy / (1 + accuracy)
+
+    def holds(k):
+        return k * alpha ** (2 + 2 * K / k) <= 1.74 * n**2 * (n + 1) * np.log1p(k / (2 * n))
+
+    bound = cert.iteration_bound(K, accuracy, "ac")
+    assert holds(0.99 * bound)
+    assert not any(holds(bound * s) for s in np.geomspace(1.01, 1e6, 50))
 
 
 def test_bad_rows_are_named():
     with pytest.raises(InvalidInputError, match="shape"):
         cert.game_lp(np.zeros(3))
+    with pytest.raises(InvalidInputError, match="regret >= 0"):
+        cert.curvature_bound(-1.0, 1.0)

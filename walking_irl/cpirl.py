@@ -99,9 +99,10 @@ def cpirl(
             status = rule_([*history, iteration])
             if status is not None and decision.w is not None:
                 decision = decision._replace(w=None, status=status)
+        iteration = replace(iteration, status=decision.status)
         history.append(iteration)
         if decision.w is not None:
-            yield replace(iteration, status=Status.CUT)
+            yield iteration
     if probe is None or not probing.may_probe(decision.status):
         yield iteration
     else:
