@@ -291,6 +291,14 @@ def test_chebyshev_centre_of_drop_last_coordinates_favours_the_last_weight(K, la
     assert chebyshev(P, coordinates="drop-last").w[-1] == pytest.approx(last, abs=1e-5)
 
 
+@pytest.mark.parametrize(("K", "fewest"), [(3, 50), (40, 80)])
+def test_too_few_samples_are_named(K, fewest):
+    P, rng = WeightPolyhedron.simplex(K), np.random.default_rng(0)
+    gravity(P, rng=rng, n_samples=fewest)
+    with pytest.raises(InvalidInputError, match=f"at least {fewest}, got {fewest - 1}"):
+        gravity(P, rng=rng, n_samples=fewest - 1)
+
+
 def test_unknown_centre_lists_the_names():
     with pytest.raises(
         InvalidInputError, match="unknown centre 'acc'; choose from ac, cc, cg, mvie"

@@ -13,8 +13,11 @@ CORE = [
     "polyhedron",
     "certificates",
     "newton",
+    "modeller",
     "archive",
     "guide",
+    "probing",
+    "snapshot",
     "stopping",
 ]
 UPPER = ["domains", "baselines", "recording", "experiments", "cli"]

@@ -23,7 +23,6 @@ from walking_irl.centres import centre_rule
 from walking_irl.errors import InvalidInputError
 from walking_irl.expert import check_expert
 from walking_irl.guide import Decision, Guide, Measure, Mode, Tolerances
-from walking_irl.polyhedron import WeightPolyhedron
 from walking_irl.snapshot import snapshot
 from walking_irl.stopping import StopRule
 from walking_irl.types import Expert, Forward, Iteration, Rule, Status
@@ -81,7 +80,6 @@ def cpirl(
     check_expert(expert)
     is_exact = expert.covariance is None
     archive = Archive(expert, min_weight)
-    WeightPolyhedron.simplex(archive.K, min_weight)
     step = tol_w if tol_w is not None else (2e-4 if is_exact else 1e-3)
     tolerances = Tolerances(tol, step, 1e-7 if is_exact else 3e-3)
     guide = Guide(archive, centre_rule(centre), mode, tolerances, measure, rng)

@@ -13,7 +13,8 @@ from walking_irl.centres.centre import CentreRule
 from walking_irl.certificates import game_lp
 from walking_irl.errors import EmptyPolyhedronError, FlatPolyhedronError
 from walking_irl.gauge import SAME, gauge_fixed
-from walking_irl.newton import Step, newton_step, reduced, standard_errors, with_secants
+from walking_irl.modeller import Model, Modeller
+from walking_irl.newton import Step, standard_errors
 from walking_irl.polyhedron import WeightPolyhedron, feasible
 from walking_irl.types import Array, Rule, Status
 
@@ -54,14 +55,6 @@ class Decision(NamedTuple):
     status: Status
 
 
-class Model(NamedTuple):
-    """Quadratic model of the regret around the best query."""
-
-    best: int
-    B: Array
-    step: Step
-
-
 class Guide:
     """Chooses queries from an archive; knows nothing of the forward solver."""
 
@@ -79,7 +72,7 @@ class Guide:
         self.is_exact = archive.covariance is None
         self.model: Model | None = None
         self._centre = centre
-        self._prior: Array | None = None
+        self._models = Modeller(archive, tolerances.secant)
         self._n_poor = self._n_nudges = 0
         self._best_before = np.inf
         self._measured: list[Array] = []
@@ -109,7 +102,7 @@ class Guide:
 
     def decide(self, rule: Rule) -> Decision:
         """Next query after the newest response, whose query was chosen by ``rule``."""
-        self.model = self._fit() if self._is_near() else None
+        self.model = self._models.fit(self._relative_regrets()) if self._is_near() else None
         status = self._stop_on_regret()
         if status is not None:
             return Decision(None, rule, self._estimate(), status)
@@ -145,35 +138,6 @@ class Guide:
         robust = archive.values(W) - W @ (archive.mu + archive.error)
         is_noise = not self.is_exact and float(robust.min()) <= 0.0
         return is_noise or float(self._relative_regrets().min()) - self._lower_bound() <= NEWTON_GAP
-
-    def _fit(self) -> Model:
-        """Model around the query that is predicted to be nearest to the minimum."""
-        archive, lo = self.archive, self.archive.min_weight
-        W, M = archive.W, archive.M
-        best = int(np.argmin(self._relative_regrets()))
-        usable = ~archive.is_match()
-        if not usable.any():
-            usable[:] = True
-        for _ in range(2):
-            prior = self._update_prior(best)
-            B = with_secants(prior, W, M, best, self.tolerances.secant)
-            steps = [newton_step(w, mu - archive.mu, B, lo) for w, mu in zip(W, M, strict=True)]
-            distance = np.where(usable, [s.decrease for s in steps], np.inf)
-            best = int(np.argmin(distance))
-        prior = self._update_prior(best)
-        B = with_secants(prior, W, M, best, self.tolerances.secant)
-        return Model(best, B, newton_step(W[best], M[best] - archive.mu, B, lo))
-
-    def _update_prior(self, best: int) -> Array:
-        """Sensitivity at the best query, else the last one that could be trusted."""
-        sensitivity = self.archive.responses[best].sensitivity
-        if sensitivity is None and self._prior is None:
-            known = [r.sensitivity for r in self.archive.responses if r.sensitivity is not None]
-            sensitivity = known[-1]
-        if sensitivity is not None and np.isfinite(sensitivity).all():
-            self._prior = reduced(sensitivity)
-        assert self._prior is not None, "some query had a finite sensitivity"
-        return self._prior
 
     def _estimate(self) -> Array:
         if self.model is not None:
@@ -301,7 +265,7 @@ class Guide:
         mean, covariance = self.measure(response.policy)
         self.archive.correct(mean - response.mu, covariance)
         self._measured.append(w)
-        self.model = self._fit()
+        self.model = self._models.fit(self._relative_regrets())
         return True
 
     def _kelley(self) -> Decision | None:

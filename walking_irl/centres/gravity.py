@@ -31,14 +31,15 @@ def gravity(P: WeightPolyhedron, *, rng: np.random.Generator, n_samples: int = 4
     Args:
         P: Polyhedron with interior.
         rng: Source of the walk's randomness; unused for K <= 5.
-        n_samples: Samples of the walk, at least 100.
+        n_samples: Samples of the walk, at least 50 and 2 K: fewer do not know its spread.
 
     Raises:
         EmptyPolyhedronError: If the polyhedron is empty or flat.
-        InvalidInputError: If there are fewer than 100 samples.
+        InvalidInputError: If there are fewer samples.
     """
-    if n_samples < 100:
-        raise InvalidInputError(f"n_samples must be at least 100, got {n_samples}")
+    fewest = max(50, 2 * P.n_objectives)
+    if n_samples < fewest:
+        raise InvalidInputError(f"n_samples must be at least {fewest}, got {n_samples}")
     centre = P.barrier
     n = len(centre.z)
     rows = whitened_rows(P.A, centre, P.b)
