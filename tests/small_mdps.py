@@ -1,4 +1,4 @@
-"""Small finite MDPs, and independent measurements of the small domains' policies."""
+"""Small finite MDPs, and independent measurements of the domains' policies."""
 
 from __future__ import annotations
 
@@ -7,6 +7,9 @@ from scipy import sparse
 
 from walking_irl.domains.driving import Driving
 from walking_irl.domains.gridworld import Gridworld
+from walking_irl.domains.humanoid.domain import Humanoid
+from walking_irl.domains.humanoid.protocol import Protocol
+from walking_irl.domains.humanoid.protocol import measure as walk_and_measure
 from walking_irl.domains.lqr import LQR
 from walking_irl.domains.walking_path import SCALES, WalkingPath
 from walking_irl.solvers import FiniteMDP
@@ -41,6 +44,9 @@ def measure(domain, response, rng: np.random.Generator) -> tuple[np.ndarray, np.
         return mean, 5 * error + truncated
     if isinstance(domain, LQR):
         return _simulated_lqr(domain, response.policy), np.full(domain.n_objectives, 1e-6)
+    if isinstance(domain, Humanoid):  # closed loop in forward dynamics
+        walked = walk_and_measure(domain.planar, response.policy, Protocol(2, noise=0.0), rng)
+        return -walked.mean, 1e-3 * np.abs(response.mu)
     assert isinstance(domain, WalkingPath)
     mu = -np.mean(
         [_walked(p.z, g) for p, g in zip(response.policy, domain.goals, strict=True)], axis=0
