@@ -65,7 +65,10 @@ def table_7_12(config: Config, runner: Runner) -> Table:
     rows += rivals(setting, task, config.max_solves, is_finite=False)
     for body in others:
         setting, task = _task(config, body, "dominance")
-        level = replace(task, arguments={"centre": "ac"})
-        rows.append(Row(setting, "CPIRL-AC level, single policy", level))
+        for label, arguments in (
+            ("CPIRL-AC level, single policy", {"centre": "ac"}),
+            ("CPIRL-AC level + Newton, single policy", {"centre": "ac", "has_newton": True}),
+        ):
+            rows.append(Row(setting, label, replace(task, arguments=arguments)))
     title = "humanoid, sub-optimal expert, mu >= mu_E, centres and algorithms"
     return runner.table("7.12", title, rows, config.seeds, NOTES)

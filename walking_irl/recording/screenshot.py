@@ -6,6 +6,7 @@ import contextlib
 import os
 import socket
 import subprocess
+import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -101,14 +102,19 @@ def _show(viewer: ViewerClient, frame: int | None) -> None:
 
 @contextlib.contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep the viewer's own log off the terminal; what goes wrong is reported as an error."""
-    before = os.environ.get("RUST_LOG")
-    os.environ["RUST_LOG"] = before or "off"
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ["RUST_LOG"]
+    """Keep the viewer's own log off the terminal; what goes wrong is reported as an error.
+
+    Vulkan complains where there is no session of a desktop, and so no folder for its sockets.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        added = {"RUST_LOG": "off", "XDG_RUNTIME_DIR": folder}
+        added = {name: value for name, value in added.items() if name not in os.environ}
+        os.environ.update(added)
+        try:
+            yield
+        finally:
+            for name in added:
+                del os.environ[name]
 
 
 def _viewer() -> str:
