@@ -492,6 +492,15 @@ def test_a_fall_is_reported_with_its_time(complaint):
     assert "fell after" in sentence and "pelvis" in sentence
 
 
+def test_terminal_says_how_sure_the_weights_are(call):
+    code, out, _ = call("recover", "--domain", "lqr", "--no-record")
+    assert code == 0
+    for part in ("certificate", "suboptimality of the expert: at most", "weights: the ",
+                 "of the volume of all is left", "least certain: axis",
+                 "features of the expert: known exactly", "L1 error"):  # fmt: skip
+        assert part in out, part
+
+
 # --- Ctrl-C
 
 

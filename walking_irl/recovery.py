@@ -13,6 +13,9 @@ from walking_irl.newton import reduced
 from walking_irl.polyhedron import WeightPolyhedron, plane_basis
 from walking_irl.types import Array, Expert, Iteration, Objective, Status
 
+ROUNDING = 1e-13
+"""Returns below this, relative to the expert's largest feature, are reported as 0."""
+
 
 @dataclass(frozen=True)
 class Recovery:
@@ -70,18 +73,18 @@ def summarise(
     names = [o.name for o in objectives] or [f"objective {i + 1}" for i in range(K)]
     scales = np.array([o.scale for o in objectives] or np.ones(K))
     condition, weakest = _identifiability(iterations, names)
+    rounding = ROUNDING * float(np.abs(expert.mu).max())
+    certificate, regret = (
+        0.0 if abs(value) <= rounding else value for value in (last.certificate, last.best_regret)
+    )
     whole = WeightPolyhedron.simplex(K, last.polyhedron.min_weight)
     return Recovery(
         w=last.estimate,
-        rule=(
-            "centre of the remaining weights, or best query"
-            if condition is None
-            else "Newton step from the best query where it applies"
-        ),
+        rule=_rule(iterations, has_model=condition is not None),
         intervals=last.intervals,
         physical_intervals=last.intervals / scales[:, None],
-        certificate=last.certificate,
-        bracket=(-last.certificate, last.best_regret),
+        certificate=certificate,
+        bracket=(0.0 - certificate, regret),
         volume_ratio=last.polyhedron.volume() / whole.volume(),
         condition_number=condition,
         weakest=weakest,
@@ -90,6 +93,42 @@ def summarise(
         n_solves=len(iterations),
         status=last.status,
     )
+
+
+def per_unit(interval: Sequence[float], unit: str) -> str:
+    """An interval of a weight per raw unit of its cost, in words.
+
+    >>> per_unit((0.25, 0.5), "m^2/s^3"), per_unit((1.0, 1.0), "rad^2 s"), per_unit((0.0, 1.0), "1")
+    ('0.25 - 0.5 per m^2/s^3', '1 - 1 per (rad^2 s)', '0 - 1')
+    """
+    low, high = interval
+    unit = f"({unit})" if " " in unit and not unit.startswith("(") else unit
+    return f"{low:.3g} - {high:.3g}" + ("" if unit == "1" else f" per {unit}")
+
+
+def noise_level(expert: Expert) -> str:
+    """How well the expert's features are known, in words.
+
+    >>> noise_level(Expert(np.array([2.0, 4.0]), np.array([0.1, 0.1]), n_samples=20))
+    'known from 20 recorded walks to within 5 % each'
+    """
+    if not np.any(expert.error):
+        return "known exactly"
+    relative = 100 * np.max(expert.error / np.maximum(np.abs(expert.mu), 1e-300))
+    walks = f" from {expert.n_samples} recorded walks" if expert.n_samples else ""
+    return f"known{walks} to within {relative:.2g} % each"
+
+
+def _rule(iterations: Sequence[Iteration], has_model: bool) -> str:
+    """How the last estimate came about."""
+    last = iterations[-1]
+    if any(np.array_equal(it.w, last.estimate) for it in iterations):
+        return "the query of the least regret"
+    if has_model:
+        return "the minimum of the regret's quadratic model (a Newton step)"
+    if last.status is Status.GAP_CLOSED:
+        return "where the policies found leave the least regret"
+    return "the centre of the weights that are left"
 
 
 def _differences(iterations: Sequence[Iteration], expert: Expert) -> Array:

@@ -10,6 +10,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from walking_irl.output import check_outputs
+from walking_irl.recovery import per_unit
 from walking_irl.report import write_json
 
 
@@ -37,8 +38,6 @@ def run(args: argparse.Namespace, console: Console) -> int:
 
 
 def _table_of_recording(content: dict[str, Any]) -> Table:
-    from walking_irl.recording.summary import per_unit
-
     table = Table("objective", "hidden", "recovered", "interval", "per raw unit")
     hidden, found, bounds = content["w_expert"], content["w"], content["intervals"]
     for j, name in enumerate(content["objectives"] or []):

@@ -27,6 +27,7 @@ from walking_irl.commands.weights import parse_weights, show_weights
 from walking_irl.domains import load
 from walking_irl.errors import InvalidInputError
 from walking_irl.output import check_ending, check_outputs, write_file
+from walking_irl.recovery import Recovery, noise_level, per_unit
 from walking_irl.report import Report, write_json
 from walking_irl.saved_run import load_run
 from walking_irl.types import Iteration, Rollout, Rule
@@ -175,17 +176,9 @@ def show_report(report: Report, console: Console, walks: Path | None) -> None:
     console.print(table)
     out = report.to_json()
     console.print(f"ended: {report.status}")
-    console.print(f"certificate {report.last.certificate:.2e} (return that some mixture may lose)")
     found = report.recovery
-    low, high = found.bracket
-    span = f"{low:.1e} to {high:.1e}" if low > 0.0 else f"at most {high:.1e}"
-    console.print(f"the expert is suboptimal by {span} (return, under its most favourable weights)")
-    if found.weakest is not None:
-        console.print(
-            f"least certain: {found.weakest} (condition number {found.condition_number:.0f})"
-        )
-    if found.gauge is not None:
-        console.print(f"not identifiable: {found.gauge}")
+    console.print(f"certificate {found.certificate:.2e} (return that some mixture may lose)")
+    _show_certainty(report, found, console)
     if report.l1_error is not None:
         inside = "inside" if report.contains_expert else "NOT inside"
         console.print(f"L1 error {report.l1_error:.5f}; hidden weights {inside} the intervals")
@@ -202,6 +195,30 @@ def show_report(report: Report, console: Console, walks: Path | None) -> None:
     if report.archive is not None and not report.is_success:
         path = escape(report.archive)
         console.print(f"to go on from here: walking-irl recover --resume {path} --max-solves N")
+
+
+def _show_certainty(report: Report, found: Recovery, console: Console) -> None:
+    """What the weights are, how sure they are, and what limits them."""
+    low, high = found.bracket
+    if high <= 0.0:
+        console.print("no policy found beats the expert under these weights")
+    else:
+        span = f"{low:.1e} to {high:.1e}" if low > 0.0 else f"at most {high:.1e}"
+        console.print(f"suboptimality of the expert: {span} (return, at its best weights)")
+    console.print(f"weights: {found.rule}; {found.volume_ratio:.1e} of the volume of all is left")
+    if found.weakest is not None:
+        console.print(
+            f"least certain: {found.weakest} (condition number {found.condition_number:.0f})"
+        )
+    if found.gauge is not None:
+        console.print(f"not identifiable: {found.gauge}")
+    if any(o.scale != 1.0 for o in report.objectives):
+        raw = zip(report.objectives, found.physical_intervals, strict=True)
+        console.print(
+            "intervals per raw unit of each cost: "
+            + ", ".join(f"{o.name} {per_unit(bounds, o.unit)}" for o, bounds in raw)
+        )
+    console.print(f"features of the expert: {noise_level(report.expert)}")
 
 
 def save_walks(path: Path, walks: tuple[Rollout, ...], joints: tuple[str, ...]) -> None:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from walking_irl.recording.experiment import Experiment
 from walking_irl.recording.panels import panels
-from walking_irl.recovery import Recovery
-from walking_irl.types import Expert
+from walking_irl.recovery import Recovery, noise_level, per_unit
+from walking_irl.types import Status
 from walking_irl.versions import versions
 
 
@@ -40,6 +39,8 @@ def summary(
 
 def _result(experiment: Experiment, found: Recovery) -> str:
     text = f"**{found.n_solves} iterations**: {found.status.value}."
+    if found.status in (Status.DOMINATED, Status.MIXTURE_DOMINATES):
+        return text + " No weights make this expert optimal; those below bring it nearest to it."
     if experiment.w_expert is not None:
         l1 = float(np.abs(found.w - experiment.w_expert).sum())
         text += f" Hidden weights recovered to {l1:.4f} (sum of absolute errors)."
@@ -63,17 +64,6 @@ def _table(experiment: Experiment, found: Recovery) -> str:
     return "\n".join(f"| {' | '.join(cells)} |" for cells in rows)
 
 
-def per_unit(interval: Sequence[float], unit: str) -> str:
-    """An interval of a weight per raw unit of its cost, in words.
-
-    >>> per_unit((0.25, 0.5), "m^2/s^3"), per_unit((1.0, 1.0), "rad^2 s"), per_unit((0.0, 1.0), "1")
-    ('0.25 - 0.5 per m^2/s^3', '1 - 1 per (rad^2 s)', '0 - 1')
-    """
-    low, high = interval
-    unit = f"({unit})" if " " in unit and not unit.startswith("(") else unit
-    return f"{low:.3g} - {high:.3g}" + ("" if unit == "1" else f" per {unit}")
-
-
 def _certainty(experiment: Experiment, found: Recovery) -> str:
     low, high = found.bracket
     lines = [
@@ -89,17 +79,8 @@ def _certainty(experiment: Experiment, found: Recovery) -> str:
         )
     if found.gauge is not None:
         lines.append(f"Not identifiable: {found.gauge}.")
-    lines.append(noise_level(experiment.expert))
+    lines.append(f"The expert's features are {noise_level(experiment.expert)}.")
     return "\n".join(f"* {text}" for text in lines)
-
-
-def noise_level(expert: Expert) -> str:
-    """How well the expert's features are known, in words."""
-    if not np.any(expert.error):
-        return "The expert's features are known exactly."
-    relative = 100 * np.max(expert.error / np.maximum(np.abs(expert.mu), 1e-300))
-    walks = f" from {expert.n_samples} recorded walks" if expert.n_samples else ""
-    return f"The expert's features are known{walks} to within {relative:.2g} % each."
 
 
 def _legend(experiment: Experiment, world: str) -> str:
