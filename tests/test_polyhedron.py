@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from problems import polyhedron_around
 
+from walking_irl.centres.analytic import analytic
 from walking_irl.errors import EmptyPolyhedronError, FlatPolyhedronError, InvalidInputError
 from walking_irl.polyhedron import WeightPolyhedron
 
@@ -33,6 +34,38 @@ def test_pruning_keeps_the_set():
     Q = P.pruned()
     assert len(Q.cuts) < len(P.cuts)
     assert Q.volume() == pytest.approx(P.volume(), rel=1e-9)
+
+
+@pytest.mark.parametrize("K", [3, 6, 11])
+def test_a_large_relevance_proves_that_a_cut_is_implied(K):
+    n_implied = 0
+    for seed in range(5):
+        P, w = polyhedron_around(np.random.default_rng(seed), K, 2, 0.05)
+        far = np.random.default_rng(seed).standard_normal((20, K))  # from inside to far outside
+        far -= far.mean(axis=1, keepdims=True)
+        far /= np.linalg.norm(far, axis=1, keepdims=True)
+        P = P.cut_all(far - (far @ w + np.geomspace(0.05, 0.9, 20))[:, None], np.ones(20, bool))
+        relevance, m = P.relevance(), len(P.barrier.slack)
+        implied = np.flatnonzero(relevance >= math.sqrt(m * (m - 1)))
+        assert not set(implied) & set(P.active_rows)
+        n_implied += len(implied)
+        in_barrier = P.relevance()[: K + 2]  # bounds and eager cuts
+        assert in_barrier.min() >= 1.0 - 1e-9
+    assert n_implied > 0
+
+
+def test_fewer_relevant_cuts_are_the_same_set_and_a_centre_inside_it():
+    rng = np.random.default_rng(0)
+    P, _ = polyhedron_around(rng, 5, 60, 0.2)
+    for most in (0, 4, 12, 60):
+        Q = P.with_relevant(most)
+        assert Q.volume() == pytest.approx(P.volume(), rel=1e-9)
+        w = analytic(P, most=most).w
+        assert P.contains(w, -1e-6), "strictly inside, though most cuts are ignored"
+        assert 5 + most <= len(Q.barrier.slack) <= 65
+    np.testing.assert_allclose(analytic(P, most=60).w, analytic(P).w, atol=1e-9)
+    with pytest.raises(InvalidInputError, match="must not be negative"):
+        P.with_relevant(-1)
 
 
 def test_cuts_never_enlarge_the_volume():

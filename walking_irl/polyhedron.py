@@ -279,6 +279,35 @@ class WeightPolyhedron:
         keep = active[active >= K] - K
         return replace(self, cuts=self.cuts[keep], is_lazy=self.is_lazy[keep])
 
+    def relevance(self) -> Array:
+        """(b_i - a_i.z) / |a_i|_{H^-1} of each row at the analytic centre z, shape (K + m,).
+
+        At least 1 for the rows in the barrier. With m rows there, a relevance of sqrt(m (m - 1))
+        proves that the others imply the row, for the Dikin ellipsoid of that radius holds the set.
+
+        Raises:
+            EmptyPolyhedronError: If the set is empty or flat.
+        """
+        root = solve_triangular(self.barrier.R, np.eye(self.n_objectives - 1))
+        distance: Array = (self.b - self.A @ self.barrier.z) / np.linalg.norm(self.A @ root, axis=1)
+        return distance
+
+    def with_relevant(self, most: int) -> WeightPolyhedron:
+        """The same set with all but the ``most`` most relevant cuts lazy.
+
+        Nothing is dropped: a lazy cut enters the barrier where it cuts off its centre, and the
+        bounds of the weights are always in it.
+
+        Raises:
+            InvalidInputError: If ``most`` is negative.
+            EmptyPolyhedronError: If the set is empty or flat.
+        """
+        if most < 0:
+            raise InvalidInputError(f"most must not be negative, got {most}")
+        is_lazy = np.ones(len(self.cuts), dtype=bool)
+        is_lazy[np.argsort(self.relevance()[self.n_objectives :], kind="stable")[:most]] = False
+        return replace(self, is_lazy=is_lazy)
+
     def volume(self) -> float:
         """(K-1)-dimensional volume; exact for K <= 7, else scaled from the barrier's Hessian.
 

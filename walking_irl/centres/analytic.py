@@ -11,7 +11,9 @@ from walking_irl.centres.centre import Centre, feasible_weights
 from walking_irl.polyhedron import WeightPolyhedron
 
 
-def analytic(P: WeightPolyhedron, *, rng: np.random.Generator | None = None) -> Centre:
+def analytic(
+    P: WeightPolyhedron, *, rng: np.random.Generator | None = None, most: int | None = None
+) -> Centre:
     """Analytic centre, argmin of -sum_i log(b_i - a_i.z) over the rows that matter.
 
     With H the Hessian there and m rows, E(1) lies inside and E(sqrt(m(m-1))) around the set, both
@@ -24,10 +26,15 @@ def analytic(P: WeightPolyhedron, *, rng: np.random.Generator | None = None) -> 
     Args:
         P: Polyhedron with interior.
         rng: Ignored.
+        most: Cuts that shape the centre, the most relevant ones; the rest only keep it inside. None
+            for all. From 3 n of them on, CPIRL asks as often as with all.
 
     Raises:
         EmptyPolyhedronError: If the polyhedron is empty or flat.
+        InvalidInputError: If ``most`` is negative.
     """
+    if most is not None:
+        P = P.with_relevant(most)
     z, R, used_slack = P.barrier
     m = len(used_slack)
     root = solve_triangular(R, np.eye(len(z)))
