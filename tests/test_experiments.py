@@ -1,5 +1,6 @@
 import csv
 import json
+import re
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from xml.etree import ElementTree
@@ -84,6 +85,9 @@ def test_files_say_the_same_thrice(tmp_path, monkeypatch):
     assert [tuple(r) for r in json.loads(content.read_text())["rows"]] == list(table.rows)
     assert markdown.read_text() == table.to_markdown()
     assert markdown.read_text().count("\n| n=2 |") == 5
+    lines = [line for line in markdown.read_text().splitlines() if line.startswith("|")]
+    n_cells = {len(re.split(r"(?<!\\)\|", line)) - 2 for line in lines}
+    assert n_cells == {len(table.columns)}, "a table that Markdown draws has rows of one length"
     words = [t.text for t in ElementTree.parse(picture).iter(f"{SVG}text")]
     assert {"n=2", "n=3", "CPIRL-AC"} <= set(words) and words.count("CPIRL-MVIE") == 2
 

@@ -56,8 +56,8 @@ class Table:
         """The table with its header and notes."""
         lines = [f"## Table {self.name}: {self.title}", ""]
         lines += [f"- {key}: {value}" for key, value in self.header.items()] + [""]
-        lines += ["| " + " | ".join(self.columns) + " |", "|" + " --- |" * len(self.columns)]
-        lines += ["| " + " | ".join(c.replace("|", "\\|") for c in row) + " |" for row in self.rows]
+        lines += [_markdown(self.columns), "|" + " --- |" * len(self.columns)]
+        lines += [_markdown(row) for row in self.rows]
         return "\n".join([*lines, "", *(f"- {note}" for note in self.notes), ""])
 
     def to_csv(self) -> str:
@@ -83,6 +83,10 @@ class Table:
         write_json(paths[2], {**content, "header": self.header, "outcomes": list(self.raw)})
         _write(paths[3], self.picture())
         return paths
+
+
+def _markdown(cells: Sequence[str]) -> str:
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 
 def _write(path: Path, text: str) -> None:
