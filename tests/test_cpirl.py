@@ -3,7 +3,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from problems import TWO_POLICIES, without_sensitivity
+from problems import TWO_POLICIES, Menu, without_sensitivity
 from scipy.optimize import minimize
 
 from walking_irl.cpirl import cpirl
@@ -302,3 +302,87 @@ def test_experts_that_make_no_sense_are_named(change, sentence):
     w_E, rng = hidden(0, 3)
     with pytest.raises(InvalidInputError, match=sentence):
         next(cpirl(LQR(3).forward, replace(LQR(3).expert(w_E, rng), **change), rng=rng))
+
+
+@pytest.mark.parametrize("has_sensitivity", [True, False])
+@pytest.mark.parametrize("seed", range(4))
+def test_least_regret_within_the_bounds_of_the_weights(seed, has_sensitivity):
+    """In "minimise" every query and the answer respect min_weight, and the answer is the best."""
+    w_E, rng = hidden(seed, 3)
+    problem, low = LQR(3), 0.2
+    expert = problem.expert(w_E, rng)
+    forward = problem.forward if has_sensitivity else without_sensitivity(problem)
+    run = list(
+        cpirl(forward, expert, mode="minimise", min_weight=low, rng=rng, probe=1e-4, max_solves=40)
+    )
+    assert run[-1].status in (Status.CONVERGED, Status.GAP_CLOSED)
+    assert all(i.estimate.min() >= low - 1e-12 for i in run)
+    assert all(i.w.min() >= low - 1e-12 for i in run if i.rule is not Rule.PROBE)
+    best = minimize(
+        lambda w: w @ (problem.forward(w / w.sum()).mu - expert.mu),
+        np.full(3, 1 / 3),
+        bounds=[(low, 1)] * 3,
+        constraints={"type": "eq", "fun": lambda w: w.sum() - 1},
+        options={"ftol": 1e-12},
+    )
+    v = run[-1].estimate
+    found = v @ (problem.forward(v).mu - expert.mu)
+    assert found <= best.fun + 1e-4 * abs(v @ expert.mu)
+
+
+@pytest.mark.parametrize("mode", ["optimal", "set"])
+def test_error_bars_without_covariance_end_in_a_match(mode):
+    for seed in range(5):
+        w_E, rng = hidden(seed, 4)
+        expert = LQR(4).expert(w_E, rng)
+        expert = replace(expert, error=0.02 * np.abs(expert.mu))
+        run = list(cpirl(without_sensitivity(LQR(4)), expert, mode=mode, tol=1e-3, rng=rng))
+        assert run[-1].status is Status.MATCHED
+        robust = [i.w @ (i.response.mu - expert.mu - expert.error) for i in run]
+        assert robust[-1] <= 1e-3 * abs(run[-1].w @ expert.mu)
+        assert all(i.polyhedron.contains(w_E) for i in run)
+
+
+def test_noisy_levels_fall_below_zero_until_the_gap_closes():
+    problem = LQR(4)
+    for seed in range(5):
+        w_E, rng = hidden(seed, 4)
+        mu = problem.forward(w_E).mu
+        expert = expert_from_returns(mu * (1 + 0.03 * rng.standard_normal((20, 4))))
+        run = list(cpirl(without_sensitivity(problem), expert, mode="minimise", rng=rng))
+        assert run[-1].status is Status.GAP_CLOSED
+        assert run[-1].intervals[:, 0].min() >= 0 and run[-1].best_regret < 0.2 * abs(w_E @ mu)
+        lo, hi = run[-1].intervals.T
+        assert np.all((lo <= w_E) & (w_E <= hi)), "intervals stay those of the robust set"
+
+
+def test_intervals_of_a_run_that_ends_early_cover_the_weights():
+    covered = n = 0
+    for seed in range(30):
+        w_E, rng = hidden(seed, 4)
+        mu = LQR(4).forward(w_E).mu
+        expert = expert_from_returns(mu * (1 + 0.01 * rng.standard_normal((20, 4))))
+        run = list(cpirl(LQR(4).forward, expert, rng=rng, max_solves=2))
+        lo, hi = run[-1].intervals.T
+        covered += int(((lo <= w_E) & (w_E <= hi)).sum())
+        n += 4
+    assert covered >= 0.95 * n
+
+
+def test_probes_of_a_set_with_error_bars_stop_where_its_bounds_are_reached():
+    w_E, rng = hidden(3, 3)
+    problem = LQR(3)
+    gap = replace(problem.expert(w_E, rng), suboptimality=0.2)
+    run = list(cpirl(without_sensitivity(problem), gap, mode="set", tol=1e-3, probe=1e-3, rng=rng))
+    probes = sum(i.rule is Rule.PROBE for i in run)
+    assert run[-1].status is Status.MATCHED and 6 <= probes <= 60, "90 where none is seen reached"
+    assert all(i.status is Status.PROBE for i in run[:-1] if i.rule is Rule.PROBE)
+
+
+def test_an_expert_of_zero_features_has_a_scale_all_the_same():
+    rng = np.random.default_rng(0)
+    w_E = np.array([0.2, 0.3, 0.5])
+    M = np.vstack([np.full(3, -1e-13), -1.0 - rng.random((20, 3))])
+    M[1:] += np.maximum(M[1:] @ w_E, 0.0)[:, None]
+    run = list(cpirl(Menu(M).forward, Expert(np.zeros(3), np.zeros(3)), rng=rng))
+    assert run[-1].status is Status.MATCHED

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from problems import without_sensitivity
 
+from walking_irl.archive import Archive
 from walking_irl.cpirl import cpirl
 from walking_irl.domains.lqr import LQR
 from walking_irl.errors import InvalidInputError
@@ -82,16 +83,17 @@ def is_kept(w_E, forward, expert, rng):
     return bool((np.array(cuts) @ w_E).max() <= 1e-9)
 
 
-def test_an_experts_own_gap_must_be_known_and_restarts_tell_it():
+@pytest.mark.parametrize("K", [4, 8])
+def test_an_experts_own_gap_must_be_known_and_restarts_tell_it(K):
     """A sloppy solver never costs an optimal expert its weights, but a sloppy expert its own."""
-    problem, n = LQR(4), 40
+    problem, n = LQR(K), 40
     exact = without_sensitivity(problem)
     kept = np.zeros(3, dtype=int)
     for seed in range(n):
         rng = np.random.default_rng(seed)
-        w_E = 0.05 + 0.8 * rng.dirichlet(np.ones(4))
+        w_E = 0.2 / K + 0.8 * rng.dirichlet(np.ones(K))
         solve = sloppy(problem, rng)
-        found = Expert(solve(w_E).mu, np.zeros(4))
+        found = Expert(solve(w_E).mu, np.zeros(K))
         gap = suboptimality_from_restarts(w_E, found.mu, [solve(w_E) for _ in range(10)])
         kept += [
             is_kept(w_E, solve, problem.expert(w_E, rng), rng),
@@ -114,3 +116,27 @@ def test_robust_cuts_are_lifted_by_error_and_gap():
     expected = first.polyhedron.cut(cut)
     np.testing.assert_allclose(second.polyhedron.A, expected.A, atol=1e-12)
     np.testing.assert_allclose(second.polyhedron.b, expected.b, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"mu": np.empty(0), "error": np.empty(0)}, {"suboptimality": np.nan}],
+    ids=["no features", "suboptimality"],
+)
+def test_experts_without_numbers_are_named(change):
+    expert = Expert(**{"mu": np.ones(3), "error": np.zeros(3), **change})
+    with pytest.raises(InvalidInputError, match="the expert"):
+        next(cpirl(LQR(3).forward, expert, rng=np.random.default_rng(0)))
+
+
+def test_a_measured_defect_never_narrows_the_experts_error_bars():
+    rng = np.random.default_rng(4)
+    X = rng.standard_normal((20, 3)) - 5.0
+    for bound in ("student", "bernstein", "hoeffding"):
+        expert = expert_from_returns(X, bound=bound, ranges=np.full(3, 6.0))
+        archive = Archive(expert, 0.0)
+        archive.correct(np.full(3, 0.1), expert.covariance)
+        assert np.all(archive.error > expert.error)
+        np.testing.assert_allclose(archive.mu, expert.mu - 0.1)
+        archive.correct(np.zeros(3), np.zeros((3, 3)))
+        np.testing.assert_allclose(archive.error, expert.error)

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from walking_irl.certificates import Game, game_lp
 from walking_irl.errors import EmptyPolyhedronError, InvalidInputError, SolverError
 from walking_irl.gauge import has_constant_sum
 from walking_irl.polyhedron import WeightPolyhedron
 from walking_irl.types import Array, Expert, Response
 
 CONFIDENCE = 0.95
+ROUNDING = 1e-9
+"""Of returns, whose features are of order 1 where they are not all zero."""
 UNREACHED = 0.02
 """By how much, relative to |w.mu_E|, an expert may beat every policy: noise or a local solver."""
 
@@ -35,6 +40,7 @@ class Archive:
         self.responses: list[Response] = []
         self._W: list[Array] = []
         self._spare = np.empty((0, len(self.mu)))
+        self._largest = 0.0
 
     @property
     def K(self) -> int:
@@ -58,21 +64,36 @@ class Archive:
             InvalidInputError: If the response's ``mu`` is not finite with shape (K,), or no policy
                 comes near the expert: then its features are not what a policy can achieve.
         """
-        mu = np.asarray(response.mu)
-        if mu.shape != (self.K,) or not np.isfinite(mu).all():
-            raise InvalidInputError(f"forward solver returned mu {mu}; need {self.K} finite values")
+        response = self._checked(response)
         self._W.append(np.asarray(w, dtype=np.float64))
         self.responses.append(response)
+        self._largest = max(self._largest, float(np.abs(response.mu).max()))
         if len(response.evaluated):
             spare = np.asarray(response.evaluated, dtype=np.float64)
             self._spare = np.r_[self._spare, spare[np.isfinite(spare).all(axis=1)]]
         best, claimed = float(self.values(w)), float(w @ (self.mu - self.error))
-        if best < claimed - UNREACHED * float(self.scale(w)):
+        if best < claimed - UNREACHED * float(self.scale(w)) - ROUNDING:
             raise InvalidInputError(
                 f"no policy achieves the expert's features: for the weights {np.round(w, 4)} the "
                 f"best policy's return is {best:.6g}, the expert's {claimed:.6g}; check the "
                 "features' sign, scale and discount"
             )
+
+    def _checked(self, response: Response) -> Response:
+        """The response, without a sensitivity that says nothing."""
+        K, mu, S = self.K, np.asarray(response.mu), response.sensitivity
+        if mu.shape != (K,) or not np.isfinite(mu).all():
+            raise InvalidInputError(f"forward solver returned mu {mu}; need {K} finite values")
+        if len(response.evaluated) and np.shape(response.evaluated)[1:] != (K,):
+            raise InvalidInputError(
+                f"evaluated policies must have shape (n, {K}), got {np.shape(response.evaluated)}"
+            )
+        if S is None:
+            return response
+        if np.shape(S) != (K, K):
+            raise InvalidInputError(f"a sensitivity must have shape ({K}, {K}), got {np.shape(S)}")
+        says = bool(np.isfinite(S).all() and np.any(S))
+        return response if says else replace(response, sensitivity=None)
 
     def values(self, w: Array) -> Array:
         """V(w) = max_i w.mu_i over all policies evaluated; (..., K) -> (...)."""
@@ -80,8 +101,11 @@ class Archive:
         return best
 
     def scale(self, w: Array) -> Array:
-        """|w.mu_E|, the unit of relative tolerances; (..., K) -> (...)."""
-        unit: Array = np.asarray(w @ np.abs(self.mu))
+        """|w.mu_E|, the unit of relative tolerances; (..., K) -> (...).
+
+        At least a thousandth of the largest feature found: an expert's may all be zero.
+        """
+        unit: Array = np.maximum(w @ np.abs(self.mu), 1e-3 * self._largest)
         return unit
 
     def regrets(self, W: Array) -> Array:
@@ -97,6 +121,15 @@ class Archive:
     def has_gauge(self) -> bool:
         """Whether all policies' features sum to the expert's, so that 1/K explains everything."""
         return has_constant_sum(np.r_[self.M, self._spare] - self.expert.mu)
+
+    def robust_regrets(self, W: Array) -> Array:
+        """Regrets against the expert's upper corner mu_E + e_E; shape (n,)."""
+        f: Array = self.values(W) - W @ (self.mu + self.error)
+        return f
+
+    def game(self) -> Game:
+        """Minimax program over the weights that are allowed: its value is -min f or below."""
+        return game_lp(self.differences(), self.min_weight)
 
     def differences(self) -> Array:
         """Robust d_i = mu_i - (mu_E + e_E) of all policies, queries first; shape (n, K)."""
@@ -141,7 +174,7 @@ class Archive:
         return float(student.ppf(1.0 - (1.0 - CONFIDENCE) / (2 * n_tests), df))
 
     def correct(self, defect: Array, covariance: Array) -> None:
-        """Lower the expert's mean by a measured defect and account for the defect's own error.
+        """Lower the expert's mean by a measured defect, and widen its error by the defect's own.
 
         Args:
             defect: Measured mean minus the solver's mu of one policy, shape (K,).
@@ -150,4 +183,5 @@ class Archive:
         assert self.expert.covariance is not None
         self.mu = self.expert.mu - defect
         self.covariance = self.expert.covariance + covariance
-        self.error = self.quantile(self.K) * np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        own = self.quantile(self.K) ** 2 * np.maximum(np.diag(covariance), 0.0)
+        self.error = np.sqrt(self.expert.error**2 + own)

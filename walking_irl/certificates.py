@@ -31,23 +31,32 @@ class Game(NamedTuple):
     """Worst weights for the mixture, shape (K,): Kelley's query."""
 
 
-def game_lp(D: Array) -> Game:
+def game_lp(D: Array, min_weight: float = 0.0) -> Game:
     """Minimax certificate t_k = max {t : w in simplex, -d_i.w >= t for all i} (Theorem 6.2.3).
 
     By duality the mixture lambda (the multipliers) satisfies
     0 <= w_E.(mu_E - mu_lambda) <= t_k, and min_i L_i(w_E) <= t_k. It never increases with more
-    policies. t_k > 0, = 0, < 0 if and only if the polyhedron of the rows has an interior, is flat,
-    or is empty (Gordan): t_k < 0 means that the mixture beats the expert in every feature.
+    policies. Where no row is constant, t_k > 0, = 0, < 0 if and only if the polyhedron of the rows
+    has an interior, is flat, or is empty (Gordan): t_k < 0 means that the mixture beats the expert
+    in every feature.
 
     >>> game = game_lp(np.array([[0.6, -0.4], [-0.4, 0.6]]))
     >>> round(game.value, 9), game.mixture.round(9).tolist()
     (-0.1, [0.5, 0.5])
+
+    Args:
+        D: Differences of the policies, shape (n, K).
+        min_weight: Lower bound of every weight; the value then holds for such weights only.
 
     Raises:
         InvalidInputError: If ``D`` is not a finite matrix with at least one row.
     """
     D = _rows(D)
     n, K = D.shape
+    if min_weight > 0.0:  # w = min_weight + share v with v on the whole simplex
+        share = 1.0 - K * min_weight
+        game = game_lp(share * D + min_weight * D.sum(axis=1, keepdims=True))
+        return game._replace(w=min_weight + share * game.w)
     scale = max(float(np.abs(D).max()), 1e-300)
     rows = np.r_[np.c_[D @ plane_basis(K) / scale, np.ones(n)], np.c_[-plane_basis(K), np.zeros(K)]]
     right = np.r_[-D.mean(axis=1) / scale, np.full(K, 1.0 / K)]
@@ -157,7 +166,8 @@ def volume_bound(D: Array, volume_ratio: float) -> float:
 
     Args:
         D: All cuts of P_k, shape (n, K).
-        volume_ratio: vol P_k / vol simplex, in [0, 1).
+        volume_ratio: vol P_k / vol simplex, in [0, 1); exact or an upper bound, which the
+            estimate of more than 7 weights' volumes is not.
     """
     D = _rows(D)
     if not 0.0 <= volume_ratio < 1.0:

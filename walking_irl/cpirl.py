@@ -87,12 +87,11 @@ def cpirl(
     decision = Decision(guide.start(), Rule.CENTRE, np.empty(0), Status.CUT)
     while decision.w is not None:
         w, rule, P = decision.w, decision.rule, guide.polyhedron()
-        response = forward(w)
-        archive.add(w, response)
+        archive.add(w, forward(w))
         decision = guide.decide(rule)
         if decision.w is not None and len(history) + 1 >= max_solves:
             decision = decision._replace(w=None, status=Status.BUDGET)
-        iteration = snapshot(guide, len(history), P, w, rule, response, decision, None)
+        iteration = snapshot(guide, len(history), P, w, rule, decision, None)
         for rule_ in stop:
             status = rule_([*history, iteration])
             if status is not None and decision.w is not None:

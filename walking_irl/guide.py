@@ -15,7 +15,7 @@ from walking_irl.errors import EmptyPolyhedronError, FlatPolyhedronError
 from walking_irl.gauge import SAME, gauge_fixed
 from walking_irl.modeller import Model, Modeller
 from walking_irl.newton import Step, standard_errors
-from walking_irl.polyhedron import WeightPolyhedron, feasible
+from walking_irl.polyhedron import WeightPolyhedron
 from walking_irl.types import Array, Rule, Status
 
 Mode = Literal["optimal", "set", "minimise"]
@@ -79,22 +79,37 @@ class Guide:
         self._steps: list[float] = []
 
     def lift(self) -> Array:
-        """Level of the cuts: 0 ('optimal'), sigma ('set') or the best regret ('minimise').
+        """Level of the weights that explain the expert: 0, sigma ('set'), or the best regret.
 
-        The best regret also where noise may have made the expert look worse than it is.
+        The best regret in 'minimise', and where noise may have made the expert look worse than it
+        is.
         """
         archive = self.archive
         if self.mode == "set":
             return self.tolerances.regret * np.abs(archive.mu)
         if (self.mode == "minimise" or not self.is_exact) and archive.responses:
-            f = archive.values(archive.W) - archive.W @ (archive.mu + archive.error)
+            f = float(archive.robust_regrets(archive.W).min())
             margin = 1.0 if self.mode == "minimise" else BIAS_MARGIN
-            return np.full(archive.K, margin * max(float(f.min()), 0.0))
+            return np.full(archive.K, margin * max(f, 0.0))
         return np.zeros(archive.K)
 
+    def probe_lift(self, level: float) -> Array:
+        """Level at which intervals are probed: ``level``, relative, and never below the cuts'."""
+        own, wanted = self.lift(), level * np.abs(self.archive.mu)
+        both: Array = own + wanted if self.mode == "minimise" else np.maximum(own, wanted)
+        return both
+
     def polyhedron(self) -> WeightPolyhedron:
-        """Weights that satisfy every cut at the present level."""
-        return self.archive.polyhedron(self.lift())
+        """Weights among which the next query is sought.
+
+        In 'minimise' those that may still lower the regret, be it below 0, as the corner of noisy
+        features allows; the expert's own gap is no reason to ask anywhere else.
+        """
+        archive = self.archive
+        if self.mode == "minimise" and archive.responses:
+            f = float(archive.robust_regrets(archive.W).min())
+            return archive.polyhedron(np.full(archive.K, f - archive.expert.suboptimality))
+        return archive.polyhedron(self.lift())
 
     def start(self) -> Array:
         """First query: the centre of all weights."""
@@ -125,7 +140,7 @@ class Guide:
         """Lower bound on min f, relative: 0 for an optimal expert."""
         if self.mode != "minimise":
             return 0.0
-        value = game_lp(self.archive.differences()).value
+        value = self.archive.game().value
         return -value / max(float(np.abs(self.archive.mu).max()), 1e-300)
 
     def _is_near(self) -> bool:
@@ -135,15 +150,23 @@ class Guide:
         if self.model is not None and not self.is_exact:
             return True
         W, archive = self.archive.W, self.archive
-        robust = archive.values(W) - W @ (archive.mu + archive.error)
-        is_noise = not self.is_exact and float(robust.min()) <= 0.0
+        is_noise = not self.is_exact and float(archive.robust_regrets(W).min()) <= 0.0
         return is_noise or float(self._relative_regrets().min()) - self._lower_bound() <= NEWTON_GAP
 
     def _estimate(self) -> Array:
-        if self.model is not None:
-            return self.model.step.w
-        best: Array = self.archive.W[int(np.argmin(self._relative_regrets()))]
-        return best
+        """Minimum of the model where the policies found do not speak against it, or best query."""
+        archive = self.archive
+        f = self._relative_regrets()
+        best: Array = archive.W[int(np.argmin(f))]
+        if self.model is None:
+            return best
+        k, _, step = self.model
+        v = step.w
+        if self.is_exact:
+            v = self._guarded(archive.W[k], step, float(f[k] * archive.scale(archive.W[k])))
+        allowed = max(float(f.min()), 0.0) + (SLACK if self.is_exact else NEWTON_GAP)
+        is_plausible = archive.regrets(v[None])[0] <= allowed * archive.scale(v)
+        return v if is_plausible else best
 
     def _stop_on_regret(self) -> Status | None:
         """Stops that need no model: dominance, a match, a closed gap."""
@@ -156,15 +179,13 @@ class Guide:
             if is_above.any():
                 return Status.DOMINATED
             if self.model is None or not self.is_exact:
-                f = float(
-                    np.min(archive.values(archive.W) - archive.W @ (archive.mu + archive.error))
-                )
+                f = float(archive.robust_regrets(archive.W).min())
                 t = game_lp(d).value
                 has_mixture = t < -tol * scale
                 # Near the minimum features err by the gap's square root: for one policy to beat
                 # the expert as the mixture does, the gap must close relative to its advantage.
                 unit = -t if has_mixture and self.is_exact else scale
-                if f + t <= tol * unit:
+                if f + archive.game().value <= tol * unit:
                     return Status.MIXTURE_DOMINATES if has_mixture else Status.GAP_CLOSED
             return None
         w: Array | None = archive.W[-1]
@@ -172,7 +193,8 @@ class Guide:
             w = gauge_fixed(archive.W[-1])
         if w is None:  # uniform weights explain every expert
             return None
-        is_trusted = self.is_exact and archive.expert.suboptimality == 0.0
+        is_trusted = self.is_exact and not archive.error.any()
+        is_trusted = is_trusted and archive.expert.suboptimality == 0.0
         slack = archive.error + archive.expert.suboptimality
         if is_trusted or self.model is not None:
             slack = np.zeros(archive.K)
@@ -196,10 +218,10 @@ class Guide:
         best, _, step = self.model
         w = archive.W[best]
         if self._n_poor >= 2 and self._best_before - self._lower_bound() <= FLOOR:
-            return Decision(None, rule, step.w, Status.CONVERGED)
+            return Decision(None, rule, self._estimate(), Status.CONVERGED)
         v = self._guarded(w, step, float(f[best] * archive.scale(w)))
         if np.abs(v - w).sum() <= tol.step and not archive.is_match()[best]:
-            return Decision(None, rule, step.w, Status.CONVERGED)
+            return Decision(None, rule, self._estimate(), Status.CONVERGED)
         is_asked = np.abs(archive.W - v).sum(axis=1) <= tol.step
         if bool((is_asked & archive.is_match()).any()):  # nothing beats the demonstration there
             return Decision(None, rule, v, Status.CONVERGED)
@@ -209,7 +231,7 @@ class Guide:
         rows = archive.rows(self.lift())
         if float((rows @ v).max()) > SLACK * float(archive.scale(v)):
             return None
-        return Decision(v, Rule.NEWTON, step.w, Status.CUT)
+        return Decision(v, Rule.NEWTON, self._estimate(), Status.CUT)
 
     def _guarded(self, w: Array, step: Step, regret: float) -> Array:
         """Shorten a step that promises more than f, whose minimum is known to be 0."""
@@ -237,7 +259,7 @@ class Guide:
             and min(self._steps[-2:]) > 0.7 * min(self._steps[:-2])
         )
         if is_measured and (length <= max(self.tolerances.step, noise) or has_stalled):
-            return Decision(None, Rule.NEWTON, step.w, Status.CONVERGED)
+            return Decision(None, Rule.NEWTON, self._estimate(), Status.CONVERGED)
         f = self._relative_regrets()
         is_poor = rule is Rule.NEWTON and float(f[-1] - f[:-1].min()) > CLEARLY_WORSE
         self._n_poor = self._n_poor + 1 if is_poor else 0
@@ -248,7 +270,7 @@ class Guide:
         v = w + (step.w - w) * share
         if np.abs(self.archive.W - v).sum(axis=1).min() <= 1e-9:  # asked before: learn elsewhere
             return None
-        return Decision(v, Rule.NEWTON, step.w, Status.CUT)
+        return Decision(v, Rule.NEWTON, self._estimate(), Status.CUT)
 
     def _measure_defect(self) -> bool:
         """Measure the best policy as the expert was measured, and correct the expert by it."""
@@ -280,7 +302,7 @@ class Guide:
             return None
         if np.abs(M[:-1] - M[-1]).max(axis=1).min() > 1e-12 * float(np.abs(archive.mu).max()):
             return None
-        w = feasible(game_lp(archive.differences()).w, archive.min_weight)
+        w = archive.game().w
         if np.abs(W - w).max(axis=1).min() <= 1e-9:
             return None
         return Decision(w, Rule.KELLEY, self._estimate(), Status.CUT)
@@ -290,12 +312,7 @@ class Guide:
         try:
             w = self._centre(self.polyhedron(), rng=self.rng).w
         except FlatPolyhedronError:  # all that is left is about one point, or one face
-            left = game_lp(self.archive.differences()).w
-            w = (
-                self._estimate()
-                if self.model is not None
-                else feasible(left, self.archive.min_weight)
-            )
+            w = self._estimate() if self.model is not None else self.archive.game().w
             return Decision(None, Rule.CENTRE, w, Status.GAP_CLOSED)
         except EmptyPolyhedronError:
             t = game_lp(self.archive.differences()).value

@@ -62,7 +62,7 @@ class Modeller:
         sensitivity = responses[best].sensitivity
         if sensitivity is None and self._prior is None:
             sensitivity = [r.sensitivity for r in responses if r.sensitivity is not None][-1]
-        if sensitivity is not None and np.isfinite(sensitivity).all():
+        if sensitivity is not None:
             self._prior = reduced(sensitivity)
-        assert self._prior is not None, "some query had a finite sensitivity"
+        assert self._prior is not None, "some query has a sensitivity"
         return with_secants(self._prior, W, M, best, self.min_distance)

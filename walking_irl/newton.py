@@ -10,13 +10,15 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import nnls
+from numpy.typing import NDArray
 
-from walking_irl.polyhedron import plane_basis
+from walking_irl.polyhedron import feasible, plane_basis
 from walking_irl.types import Array
 
 SECANT_RATIO = 8.0
 """A secant whose curvature differs more than this from the model's is not trusted."""
+MUCH_SHORTENED = 0.05
+"""Share of a step to an extreme below which it follows the bound that it meets instead."""
 
 
 class Step(NamedTuple):
@@ -67,8 +69,9 @@ def with_secants(B: Array, W: Array, M: Array, best: int, min_distance: float) -
 def newton_step(w: Array, gradient: Array, B: Array, min_weight: float) -> Step:
     """Minimise g.(v - w) + (v - w)'H(v - w)/2 over weights v >= min_weight, sum(v) = 1.
 
-    Solved exactly as a least-distance problem (Lawson and Hanson, *Solving Least Squares Problems*,
-    chapter 23).
+    By an active-set method from ``w`` (Nocedal and Wright, *Numerical Optimization*, algorithm
+    16.3): each step minimises over the weights that are not at their bound and goes as far as the
+    next bound, so that a Hessian that is nearly singular cannot lead outside.
 
     Args:
         w: Query, shape (K,).
@@ -77,33 +80,56 @@ def newton_step(w: Array, gradient: Array, B: Array, min_weight: float) -> Step:
         min_weight: Lower bound of every weight.
     """
     U = plane_basis(len(w))
-    g = U.T @ gradient
-    L = np.linalg.cholesky(B)
-    free = -np.linalg.solve(B, g)
-    v = w + U @ free
-    if v.min() < min_weight:
-        v = v + U @ np.linalg.solve(L.T, _least_distance(np.linalg.solve(L, U.T).T, min_weight - v))
-        v = np.maximum(v, min_weight)
-    v = v / v.sum()
+    v = w - U @ np.linalg.solve(B, U.T @ gradient)
+    if not v.min() >= min_weight:
+        v = _bounded_minimum(feasible(w, min_weight), w, gradient, U @ B @ U.T, min_weight)
+    v = feasible(v, min_weight)
     z = U.T @ (v - w)
-    return Step(v, -float(g @ z + 0.5 * z @ B @ z))
+    decrease = -float((U.T @ gradient) @ z + 0.5 * z @ B @ z)
+    if not (np.isfinite(decrease) and decrease > 0.0):
+        return Step(feasible(w, min_weight), 0.0)
+    return Step(v, decrease)
 
 
-def _least_distance(G: Array, h: Array) -> Array:
-    """Shortest y with G y >= h, shapes (m, n) and (m,); the rows must be consistent."""
-    n = G.shape[1]
-    E = np.r_[G.T, h[None]]
-    u, _ = nnls(E, np.r_[np.zeros(n), 1.0])
-    r = E @ u - np.r_[np.zeros(n), 1.0]
-    y: Array = -r[:n] / r[n]
-    return y
+def _bounded_minimum(v: Array, w: Array, gradient: Array, H: Array, min_weight: float) -> Array:
+    """Minimiser of the model about ``w`` over the weights, from weights ``v``; shape (K,)."""
+    K = len(w)
+    is_free = v > min_weight
+    for _ in range(10 * K):
+        p = _free_step(H, gradient + H @ (v - w), is_free)
+        room = np.full(K, np.inf)
+        room[p < 0.0] = (v[p < 0.0] - min_weight) / -p[p < 0.0]
+        blocking = int(np.argmin(room))
+        if room[blocking] < 1.0:
+            v = v + room[blocking] * p
+            v[blocking], is_free[blocking] = min_weight, False
+            continue
+        v = v + p
+        g = gradient + H @ (v - w)
+        price = np.where(is_free, np.inf, g - g[is_free].mean())
+        leaves = int(np.argmin(price))
+        if not price[leaves] < -1e-12 * max(float(np.abs(g).max()), 1e-300):
+            break
+        is_free[leaves] = True
+    return v
+
+
+def _free_step(H: Array, g: Array, is_free: NDArray[np.bool_]) -> Array:
+    """Minimiser of g.p + p'Hp/2 over sum(p) = 0 in which only free weights move, shape (K,)."""
+    p = np.zeros(len(g))
+    if is_free.sum() < 2:
+        return p
+    V = plane_basis(int(is_free.sum()))
+    part = H[np.ix_(is_free, is_free)]
+    p[is_free] = -V @ np.linalg.lstsq(V.T @ part @ V, V.T @ g[is_free], rcond=None)[0]
+    return p
 
 
 def extremes(w: Array, B: Array, drop: float, min_weight: float) -> Array:
     """Predicted extreme weights of {f <= drop} around a minimum at ``w``; shape (2K, K).
 
     Weight j reaches w_j +- sqrt(2 drop (U B^-1 U')_jj); rows come in pairs (+, -), shortened where
-    a weight would fall below half its bound.
+    a weight would fall below half its bound, or bent along the bound where next to nothing is left.
     """
     U = plane_basis(len(w))
     C = U @ np.linalg.solve(B, U.T)
@@ -112,7 +138,9 @@ def extremes(w: Array, B: Array, drop: float, min_weight: float) -> Array:
     for step in steps:
         for v in (step, -step):
             room = np.where(v < 0.0, (w - 0.5 * min_weight) / np.maximum(-v, 1e-300), np.inf)
-            out.append(np.maximum(w + min(1.0, float(room.min())) * v, 0.0))
+            share = min(1.0, float(room.min()))
+            end = w + v if share < MUCH_SHORTENED else w + share * v
+            out.append(np.maximum(end, 0.5 * min_weight))
     W: Array = np.array(out) / np.sum(out, axis=1, keepdims=True)
     return W
 

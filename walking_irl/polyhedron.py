@@ -52,8 +52,9 @@ def plane_basis(n_objectives: int) -> Array:
 
 def feasible(w: Array, min_weight: float) -> Array:
     """Weights with rounding clipped onto their bounds, (..., K) -> (..., K)."""
-    w = np.maximum(w, min_weight)
-    normalised: Array = w / w.sum(axis=-1, keepdims=True)
+    excess = np.maximum(w - min_weight, 0.0)
+    share = 1.0 - w.shape[-1] * min_weight
+    normalised: Array = min_weight + share * excess / excess.sum(axis=-1, keepdims=True)
     return normalised
 
 
@@ -311,7 +312,8 @@ class WeightPolyhedron:
     def volume(self) -> float:
         """(K-1)-dimensional volume; exact for K <= 7, else scaled from the barrier's Hessian.
 
-        The estimate is exact on the simplex itself: vol(simplex) sqrt(det H_simplex / det H).
+        The estimate is exact on the simplex itself: vol(simplex) sqrt(det H_simplex / det H). After
+        many cuts it is too small, by a factor of 2 in runs and of 100 after 100 random cuts.
         Flat and empty sets have volume 0.
         """
         if self.ball.radius <= FLAT_RADIUS:

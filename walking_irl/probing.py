@@ -70,14 +70,14 @@ def _once(
         queries = extremes(w, guide.model.B, drop, archive.min_weight)
     else:
         eye = np.eye(archive.K)
-        P = archive.polyhedron(level * np.abs(archive.mu))
+        P = archive.polyhedron(guide.probe_lift(level))
         queries = np.array([P.support(s * e)[1] for e in eye for s in (1.0, -1.0)])
     responses = (map if executor is None else executor.map)(forward, list(queries))
     for i, (query, response) in enumerate(zip(queries, responses, strict=True), start=1):
-        P = archive.polyhedron(_lift(guide, level))
+        P = archive.polyhedron(guide.probe_lift(level))
         archive.add(query, response)
         now = decision if i == len(queries) else decision._replace(status=Status.PROBE)
-        yield snapshot(guide, last.k + i, P, query, Rule.PROBE, response, now, level)
+        yield snapshot(guide, last.k + i, P, query, Rule.PROBE, now, level)
 
 
 def _until_reached(
@@ -93,7 +93,7 @@ def _until_reached(
         guide.archive.add(w, response)
         query, k = next(queries, None), k + 1
         now = decision if query is None else decision._replace(status=Status.PROBE)
-        yield snapshot(guide, k, P, w, Rule.PROBE, response, now, level)
+        yield snapshot(guide, k, P, w, Rule.PROBE, now, level)
 
 
 def _ends(guide: Guide, level: float) -> Iterator[tuple[Array, WeightPolyhedron]]:
@@ -101,15 +101,11 @@ def _ends(guide: Guide, level: float) -> Iterator[tuple[Array, WeightPolyhedron]
     archive = guide.archive
     for direction in np.vstack([np.eye(archive.K), -np.eye(archive.K)]):
         for _ in range(MOST_PROBES):
-            P = archive.polyhedron(_lift(guide, level))
+            P = archive.polyhedron(guide.probe_lift(level))
             w = P.support(direction)[1]
             if np.abs(archive.W - w).max(axis=1).min() <= 1e-9:
                 break
             yield w, P
-            if archive.regrets(w[None])[0] <= REACHED * level * float(archive.scale(w)):
+            f = float(archive.robust_regrets(w[None])[0]) - archive.expert.suboptimality
+            if f <= REACHED * float(w @ guide.probe_lift(level)):
                 break
-
-
-def _lift(guide: Guide, level: float) -> Array:
-    lift: Array = np.maximum(guide.lift(), level * np.abs(guide.archive.mu))
-    return lift

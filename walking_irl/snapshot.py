@@ -8,8 +8,10 @@ from walking_irl.certificates import game_lp
 from walking_irl.guide import Decision, Guide
 from walking_irl.newton import standard_errors
 from walking_irl.polyhedron import WeightPolyhedron
-from walking_irl.types import Array, Iteration, Response, Rule, Status
+from walking_irl.types import Array, Iteration, Rule, Status
 
+SETTLED = (Status.CONVERGED, Status.MATCHED, Status.GAP_CLOSED, Status.PROBE)
+"""Endings at which the quadratic model of a noisy expert's regret can be trusted."""
 INTERVAL_FLOOR = 0.002
 """Added to the standard errors of estimated weights: what secants leave of the Hessian's error."""
 
@@ -20,7 +22,6 @@ def snapshot(
     P: WeightPolyhedron,
     w: Array,
     rule: Rule,
-    response: Response,
     decision: Decision,
     probe: float | None,
 ) -> Iteration:
@@ -32,7 +33,6 @@ def snapshot(
         P: Polyhedron in which ``w`` was chosen, before the answer's cut.
         w: Query, shape (K,).
         rule: How it was chosen.
-        response: The forward solver's answer.
         decision: What is believed after it.
         probe: Relative level of the intervals, or None for that of the cuts.
     """
@@ -43,7 +43,7 @@ def snapshot(
         polyhedron=P,
         w=w,
         rule=rule,
-        response=response,
+        response=archive.responses[-1],
         regret=float(f[-1]),
         best_regret=float(f.min()),
         certificate=game_lp(archive.differences()).value,
@@ -54,12 +54,10 @@ def snapshot(
 
 
 def _intervals(guide: Guide, decision: Decision, probe: float | None) -> Array:
-    """Cut-based bounds; for an estimated expert at the end t standard errors + a floor."""
+    """Cut-based bounds; for an estimated expert that converged t standard errors + a floor."""
     archive = guide.archive
-    if guide.is_exact or guide.model is None or decision.status is Status.CUT:
-        lift = guide.lift()
-        if probe is not None:
-            lift = np.maximum(lift, probe * np.abs(archive.mu))
+    if guide.is_exact or guide.model is None or decision.status not in SETTLED:
+        lift = guide.lift() if probe is None else guide.probe_lift(probe)
         return archive.intervals(lift, decision.estimate)
     assert archive.covariance is not None
     half = archive.quantile(1) * standard_errors(guide.model.B, archive.covariance)
