@@ -10,7 +10,7 @@ import numpy as np
 from walking_irl.errors import InvalidInputError
 from walking_irl.gauge import freedom_in_words
 from walking_irl.newton import reduced
-from walking_irl.polyhedron import WeightPolyhedron, plane_basis
+from walking_irl.polyhedron import EXACT_OBJECTIVES, WeightPolyhedron, plane_basis
 from walking_irl.types import Array, Expert, Iteration, Objective, Status
 
 ROUNDING = 1e-13
@@ -105,6 +105,12 @@ def per_unit(interval: Sequence[float], unit: str) -> str:
     low, high = interval
     unit = f"({unit})" if " " in unit and not unit.startswith("(") else unit
     return f"{low:.3g} - {high:.3g}" + ("" if unit == "1" else f" per {unit}")
+
+
+def volume_left(found: Recovery) -> str:
+    """Share of all weights' volume that is left, in words."""
+    is_exact = len(found.w) <= EXACT_OBJECTIVES
+    return f"{'' if is_exact else 'very roughly '}{found.volume_ratio:.1e} of the volume of all"
 
 
 def noise_level(expert: Expert) -> str:

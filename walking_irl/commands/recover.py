@@ -27,7 +27,7 @@ from walking_irl.commands.weights import parse_weights, show_weights
 from walking_irl.domains import load
 from walking_irl.errors import InvalidInputError
 from walking_irl.output import check_ending, check_outputs, write_file
-from walking_irl.recovery import Recovery, noise_level, per_unit
+from walking_irl.recovery import Recovery, noise_level, per_unit, volume_left
 from walking_irl.report import Report, write_json
 from walking_irl.saved_run import load_run
 from walking_irl.types import Iteration, Rollout, Rule
@@ -205,7 +205,7 @@ def _show_certainty(report: Report, found: Recovery, console: Console) -> None:
     else:
         span = f"{low:.1e} to {high:.1e}" if low > 0.0 else f"at most {high:.1e}"
         console.print(f"suboptimality of the expert: {span} (return, at its best weights)")
-    console.print(f"weights: {found.rule}; {found.volume_ratio:.1e} of the volume of all is left")
+    console.print(f"weights: {found.rule}; {volume_left(found)} is left")
     if found.weakest is not None:
         console.print(
             f"least certain: {found.weakest} (condition number {found.condition_number:.0f})"

@@ -8,7 +8,7 @@ import numpy as np
 
 from walking_irl.recording.experiment import Experiment
 from walking_irl.recording.panels import panels
-from walking_irl.recovery import Recovery, noise_level, per_unit
+from walking_irl.recovery import Recovery, noise_level, per_unit, volume_left
 from walking_irl.types import Status
 from walking_irl.versions import versions
 
@@ -70,7 +70,7 @@ def _certainty(experiment: Experiment, found: Recovery) -> str:
         f"The weights shown: {found.rule}.",
         f"The least regret of any weights lies between {low:.1e} and {high:.1e}; "
         "an expert that is optimal for some weights needs 0 in between.",
-        f"Of the volume of all weights {found.volume_ratio:.1e} is left.",
+        f"The cuts leave {volume_left(found)} weights.",
     ]
     if found.weakest is not None:
         lines.append(
