@@ -54,6 +54,16 @@ def test_abbeel_and_ng_approach_an_achievable_expert(method):
     assert distances[0] > 5 * distances[-1]
 
 
+@pytest.mark.parametrize("method", [projection, max_margin])
+def test_abbeel_and_ng_answer_with_the_closest_mixture_of_all_policies(method):
+    domain, rng = finite_domain(2)
+    expert = achievable_expert(domain, rng)
+    for a in method(domain.solve, expert, rng=rng, max_solves=15):
+        assert a.mixture.min() >= 0 and a.mixture.sum() == pytest.approx(1.0)
+        gap = expert.mu - a.mu
+        assert (a.M @ gap).max() <= a.mu @ gap + 1e-9, "no mixture is closer"
+
+
 def test_max_margin_needs_no_more_solves_than_projection():
     totals = {}
     for method in (projection, max_margin):

@@ -36,11 +36,11 @@ SMALL_GRID = gridworld.Config(
     samples=(100, 200),
     seeds=2,
     max_solves=30,
-    mwal_rounds=20,
+    mwal_rounds=(20,),
 )
-SMALL_LQR = lqr.Config(sizes=(2, 3), seeds=1, mwal_rounds=20, max_solves=20)
+SMALL_LQR = lqr.Config(sizes=(2, 3), seeds=1, mwal_rounds=(20,), max_solves=20)
 SMALL_WALK = humanoid.Config(max_solves=1, seeds=1, bodies=("humanoid-planar",))
-SMALL_PATH = walking_path.Config(n_intervals=6, seeds=1, max_solves=2, mwal_rounds=2)
+SMALL_PATH = walking_path.Config(n_intervals=6, seeds=1, max_solves=2, mwal_rounds=(2,))
 
 
 def untimed(outcomes):

@@ -27,7 +27,7 @@ def max_margin(
     Args:
         forward: Best policy for weights; must take negative ones where ``is_signed``.
         expert: The expert; only ``mu`` is used.
-        rng: Draws the first weights, as the original does.
+        rng: Draws the first weights (the original draws a first policy).
         tol: Margin that counts as none, relative to |mu_E|_2.
         max_solves: Budget of forward solves.
         is_signed: Whether weights may be negative, as in the original; else w >= 0 is added.

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from walking_irl.baselines.apprentice import Apprentice, checked_budget
+from walking_irl.baselines.apprentice import Apprentice, checked_budget, closest_mixture
 from walking_irl.types import Array, Expert, Forward, Response, Status
 
 
@@ -22,14 +22,15 @@ def projection(
     """Move a point of the hull of the policies towards the expert, one line at a time.
 
     mu_bar_i = mu_bar_{i-1} + ((d.(mu_E - mu_bar_{i-1})) / d.d) d with d = mu_i - mu_bar_{i-1}, and
-    w_{i+1} = mu_E - mu_bar_i. The step is kept within [0, 1], so that mu_bar stays in the hull and
-    the steps themselves give the mixture. Queries are scaled to sum |w| = 1.
+    w_{i+1} = mu_E - mu_bar_i. The step is kept within [0, 1], so that mu_bar stays in the hull.
+    Queries are scaled to sum |w| = 1. The answer is the mixture of all policies found that is
+    closest to the expert (their section 3, a quadratic program), not mu_bar, which is farther.
 
     Args:
         forward: Best policy for weights; must take negative ones where ``is_signed``.
         expert: The expert; only ``mu`` is used.
-        rng: Draws the first weights, as the original does.
-        tol: Distance |mu_E - mu_bar|_2 that counts as none, relative to |mu_E|_2.
+        rng: Draws the first weights (the original draws a first policy).
+        tol: Distance |mu_E - mu_bar|_2 at which it stops, relative to |mu_E|_2.
         max_solves: Budget of forward solves.
         is_signed: Whether weights may be negative, as in the original. Else only the positive part
             of mu_E - mu_bar counts, for domains whose solver needs w >= 0.
@@ -41,11 +42,16 @@ def projection(
     w = rng.dirichlet(np.ones(len(expert.mu)))
     W: list[Array] = []
     responses: list[Response] = []
-    mixture, point = np.empty(0), expert.mu
+    point = expert.mu
     for _ in range(max_solves):
         W.append(w)
         responses.append(forward(w))
-        point, mixture = _moved(point, mixture, responses[-1].mu, expert.mu, is_signed)
+        mu = responses[-1].mu
+        d, gap = mu - point, expert.mu - point
+        point = mu if len(W) == 1 else point + _step(d, gap, is_signed) * d
+        mixture = closest_mixture(
+            np.array([r.mu for r in responses]), expert.mu, is_signed=is_signed
+        )
         gap = expert.mu - point if is_signed else np.maximum(expert.mu - point, 0.0)
         is_close = np.linalg.norm(gap) <= tol * np.linalg.norm(expert.mu)
         is_last = len(W) == max_solves
@@ -54,17 +60,6 @@ def projection(
         if is_close:
             return
         w = gap / np.abs(gap).sum()
-
-
-def _moved(
-    point: Array, mixture: Array, mu: Array, mu_E: Array, is_signed: bool
-) -> tuple[Array, Array]:
-    """The point of the segment from ``point`` to ``mu`` closest to the expert; its mixture."""
-    if not len(mixture):
-        return mu, np.ones(1)
-    d = mu - point
-    step = _step(d, mu_E - point, is_signed)
-    return point + step * d, np.r_[(1 - step) * mixture, step]
 
 
 def _step(d: Array, gap: Array, is_signed: bool) -> float:

@@ -72,6 +72,8 @@ def polished(a: Array, goal: Array, path: Path) -> Path:
         g = a @ J
         multipliers = -np.asarray(np.linalg.lstsq(E.T, g, rcond=None)[0], dtype=np.float64)
         Z = null_space(E)
+        if not Z.shape[1]:  # every control sits on its bound
+            return path
         H = hessian(z, goal, a, multipliers)[np.ix_(free, free)]
         values, vectors = np.linalg.eigh(Z.T @ H @ Z)
         if values[0] <= 1e-12 * values[-1]:
@@ -131,4 +133,11 @@ def straight_start(goal: Array, n_intervals: int) -> Array:
     """Start of a search: stand still for as long as the goal takes at 1 m/s, at least 2 s."""
     z = np.zeros(3 * n_intervals + 1)
     z[-1] = max(2.0, float(np.hypot(goal[0], goal[1])))
+    return z
+
+
+def bent_start(goal: Array, n_intervals: int) -> Array:
+    """The same, but to the left first and back: for searches that must not stay symmetric."""
+    z = straight_start(goal, n_intervals)
+    z[2:-1:3] = 0.5 * np.where(np.arange(n_intervals) < n_intervals / 2, 1.0, -1.0)
     return z

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from walking_irl.domains.path_model import costs, integrate
-from walking_irl.domains.path_solver import Path, polished, slsqp_path, straight_start
+from walking_irl.domains.path_solver import Path, bent_start, polished, slsqp_path, straight_start
 from walking_irl.domains.weights import checked_weights
 from walking_irl.errors import InvalidInputError, SolverError
 from walking_irl.types import Array, Expert, Objective, Response
@@ -92,7 +92,9 @@ class WalkingPath:
     def path(self, a: Array, i: int) -> Path:
         """Best path to goal ``i`` for raw weights ``a``, shape (5,)."""
         goal = self.goals[i]
-        starts = (straight_start(goal, self.n_intervals), self._library[i])
+        starts = [straight_start(goal, self.n_intervals), self._library[i]]
+        if goal[1] == goal[2] == 0.0:  # straight ahead both are symmetric, the best may not be
+            starts.append(bent_start(goal, self.n_intervals))
         coarse = _best(a, goal, starts)
         path = polished(a, goal, coarse)
         if path.sensitivity is None:  # Newton's method does not apply: finish by SLSQP

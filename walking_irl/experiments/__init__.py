@@ -76,8 +76,8 @@ def run_tables(
         InvalidInputError: If a name is unknown or ``seeds`` below 1.
     """
     chosen = list(TABLES) if "all" in names else list(dict.fromkeys(names))
-    for name in chosen:
-        if name not in TABLES:
+    for name in names:
+        if name not in (*TABLES, "all"):
             choices = f"{', '.join(TABLES)} or all"
             raise InvalidInputError(f"unknown table {name!r}; choose from {choices}")
     if seeds is not None and seeds < 1:

@@ -50,7 +50,7 @@ def table_7_11(config: Config, runner: Runner) -> Table:
     first, *others = config.bodies
     setting, task = _task(config, first, "return")
     rows = centre_rows(setting, task)
-    rows += rivals(setting, task, config.max_solves, is_finite=False)
+    rows += rivals(setting, task, (config.max_solves,), is_finite=False)
     for body in others:
         rows += centre_rows(*_task(config, body, "return"), centres=("ac",))
     title = "humanoid, within 1 % of J_E, centres and algorithms"
@@ -62,7 +62,7 @@ def table_7_12(config: Config, runner: Runner) -> Table:
     first, *others = config.bodies
     setting, task = _task(config, first, "dominance")
     rows = dominance_rows(setting, task)
-    rows += rivals(setting, task, config.max_solves, is_finite=False)
+    rows += rivals(setting, task, (config.max_solves,), is_finite=False)
     for body in others:
         setting, task = _task(config, body, "dominance")
         for label, arguments in (

@@ -8,12 +8,13 @@ import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, as_completed
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
-from walking_irl import __version__
 from walking_irl.experiments.table import COLUMNS, Table, machine, summary
 from walking_irl.experiments.tasks import Task, run_task
+from walking_irl.versions import versions
 
 Progress = Callable[[str, int, int], None]
 """Called with the table's name, tasks done, tasks in all."""
@@ -23,9 +24,20 @@ NOTES = (
     "Solves end with the first success, or with the method's own end or budget.",
     "Time in queries is all but the forward solves; for CPIRL it includes the weight intervals of "
     "every iteration, which no rival computes.",
+    "|dw| is that of CPIRL's estimate after the last solve (its next centre or Newton step); where "
+    "there is no estimate, that of the last query.",
     "n/a in a column: the method has no such figure (signed weights are no estimate on the "
-    "simplex; only CPIRL bounds weights).",
+    "simplex; only CPIRL bounds weights; LPAL solves one program and no forward problem).",
 )
+
+
+@cache
+def code_digest() -> str:
+    """Digest of this package's sources: a cell is one of this code, or is run again."""
+    digest = hashlib.sha256()
+    for path in sorted(Path(__file__).parents[1].rglob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
 
 
 @dataclass(frozen=True)
@@ -98,7 +110,7 @@ class Runner:
     def _path(self, task: Task) -> Path | None:
         if self.cache is None:
             return None
-        text = json.dumps([__version__, task.key()], sort_keys=True)
+        text = json.dumps([code_digest(), versions(), machine(), task.key()], sort_keys=True)
         return self.cache / f"{hashlib.sha256(text.encode()).hexdigest()[:24]}.json"
 
     def _cached(self, task: Task) -> dict[str, Any] | None:

@@ -15,6 +15,7 @@ import numpy as np
 
 from walking_irl.experiments.picture import solves_chart, steps_chart
 from walking_irl.report import write_json
+from walking_irl.types import Array
 from walking_irl.versions import versions
 
 COLUMNS = (
@@ -114,12 +115,18 @@ def summary(setting: str, method: str, outcomes: Sequence[dict[str, Any]]) -> tu
         method,
         _mean(outcomes, "seconds", ".3f"),
         _mean(outcomes, "query_seconds", ".3f"),
-        f"{solves.mean():.1f} +- {error:.1f}" if len(solves) > 1 else f"{solves.mean():.1f}",
+        _solves(solves, error),
         f"{sum(o['success'] for o in outcomes)}/{len(outcomes)}",
         _mean(outcomes, "dw", ".3f"),
         _mean(outcomes, "certificate", ".2e"),
         _mean(outcomes, "width", ".3f"),
     )
+
+
+def _solves(solves: Array, error: float) -> str:
+    if not solves.any():
+        return "n/a"
+    return f"{solves.mean():.1f} +- {error:.1f}" if len(solves) > 1 else f"{solves.mean():.1f}"
 
 
 def _mean(outcomes: Sequence[dict[str, Any]], key: str, form: str) -> str:

@@ -13,8 +13,8 @@ from walking_irl.experiments.tasks import Task
 
 NOTES = (
     *LQR_NOTES,
-    "Their queries are mixed with 5 % uniform weights: where a term costs nothing, accelerations "
-    "stick to their bounds and a solve takes half a minute.",
+    "The rivals' queries are mixed with 5 % uniform weights: where a term costs nothing, "
+    "accelerations stick to their bounds.",
 )
 
 
@@ -26,14 +26,15 @@ class Config:
         n_intervals: N of the path model; 20 costs a third of 40 and moves J by 1e-3.
         share: 1 % of |J_E| (thesis, section 7.3).
         max_solves: Budget of CPIRL and of all rivals but MWAL.
-        mwal_rounds: T of MWAL, fixed in advance; small, for a solve takes a third of a second.
+        mwal_rounds: Numbers T of MWAL's rounds, fixed in advance, each a row; small, for a solve
+            takes a third of a second.
         seeds: Hidden experts per cell.
     """
 
     n_intervals: int = 20
     share: float = 0.01
     max_solves: int = 20
-    mwal_rounds: int = 30
+    mwal_rounds: tuple[int, ...] = (10, 30)
     seeds: int = 3
 
 
