@@ -12,7 +12,7 @@ import time
 import numpy as np
 import pytest
 
-from walking_irl import __version__
+from walking_irl import __version__, experiments
 from walking_irl.cli import main
 from walking_irl.commands import recover
 from walking_irl.commands.view import SCREENS
@@ -21,6 +21,7 @@ from walking_irl.domains.humanoid.files import load_gait, save_gait
 from walking_irl.domains.humanoid.gait import whole_cycle
 from walking_irl.domains.humanoid.library import load_gaits
 from walking_irl.domains.humanoid.objectives import REFERENCE_WEIGHTS
+from walking_irl.domains.lqr import LQR
 from walking_irl.errors import FallError, SolverError
 from walking_irl.recording.reader import inspect_recording
 
@@ -499,6 +500,101 @@ def test_terminal_says_how_sure_the_weights_are(call):
                  "of the volume of all is left", "least certain: axis",
                  "features of the expert: known exactly", "L1 error"):  # fmt: skip
         assert part in out, part
+
+
+@pytest.mark.parametrize(
+    "argv",
+    [
+        ("--record", "a.rrd", "--json", "{}/a.rrd"),
+        ("--record", "sub/../a.rrd", "--json", "a.rrd"),
+        ("--archive", "b.npz", "--json", "./b.npz"),
+    ],
+)
+def test_two_results_never_share_a_file_by_other_names(complaint, tmp_path, argv):
+    (tmp_path / "sub").mkdir()
+    argv = [a.format(tmp_path) for a in argv]
+    assert "two results" in complaint("recover", "--domain", "lqr", *argv)
+    assert not list(tmp_path.glob("*.rrd"))
+
+
+def test_what_is_read_is_never_written(call, complaint, tmp_path):
+    assert call("recover", "--domain", "lqr", "--record", "a.rrd")[0] == 0
+    before = {p: p.read_bytes() for p in tmp_path.iterdir()}
+    assert "is read" in complaint("inspect", "a.rrd", "--json", "a.rrd")
+    archive = "a.archive.npz"
+    resumed = ("recover", "--resume", archive, "--archive", "b.npz", "--no-record")
+    assert "is read" in complaint(*resumed, "--json", archive)
+    assert all(p.read_bytes() == content for p, content in before.items())
+
+
+def test_settings_of_recorded_walkers_are_refused_elsewhere(complaint):
+    for option, value in (("--rollouts", 5), ("--noise", "nan"), ("--population", "uniform")):
+        sentence = complaint("recover", "--domain", "lqr", option, value, "--no-record")
+        assert option[2:] in sentence and "known exactly" in sentence
+
+
+def test_huge_numbers_are_understood_or_named(call, complaint):
+    huge = ("recover", "--domain", "lqr", "--no-record", "--weights", "1e308,1e308,1e308")
+    code, out, err = call(*huge)
+    assert code == 0 and not err and "0.3333, 0.3333, 0.3333" in out
+    sentence = complaint("recover", "--domain", "lqr", "--seed", 2**63)
+    assert "seed must be a whole number" in sentence
+
+
+def test_solver_that_fails_on_the_way_loses_nothing(call, tmp_path, monkeypatch):
+    solved = []
+    forward = LQR.forward
+
+    def failing(self, w):
+        solved.append(w)
+        if len(solved) == 5:
+            raise SolverError("no gait today")
+        return forward(self, w)
+
+    monkeypatch.setattr(LQR, "forward", failing)
+    code, out, err = call("recover", "--domain", "lqr", "--json", "o.json", "--record", "o.rrd")
+    assert code == 1 and not err and "a forward solve failed: no gait today" in out
+    content = json.loads((tmp_path / "o.json").read_text())
+    assert len(content["history"]) == 4 and "no gait today" in content["status"]
+    assert "--resume o.archive.npz" in out
+    monkeypatch.setattr(LQR, "forward", forward)
+    code, out, _ = call("recover", "--resume", "o.archive.npz", "--no-record")
+    assert code == 0 and "4 known from before" in out
+
+
+def test_result_does_not_hang_on_the_solve_that_scores_it(call, tmp_path, monkeypatch):
+    calls = []
+    forward = LQR.forward
+
+    def counted(self, w):
+        calls.append(w)
+        return forward(self, w)
+
+    monkeypatch.setattr(LQR, "forward", counted)
+    job = ("recover", "--domain", "lqr", "--max-solves", "2", "--no-record", "--json", "o.json")
+    assert call(*job)[0] == 1
+    n_solves = len(calls) - 1
+
+    def fails_last(self, w):
+        calls.append(w)
+        if len(calls) > n_solves:
+            raise KeyboardInterrupt
+        return forward(self, w)
+
+    calls.clear()
+    monkeypatch.setattr(LQR, "forward", fails_last)
+    code, out, _ = call(*job)
+    assert code == 1 and "budget" in out
+    assert json.loads((tmp_path / "o.json").read_text())["relative_loss"] is None
+
+
+def test_interrupted_tables_say_where_they_go_on(call, tmp_path, monkeypatch):
+    def interrupted(*args, **settings):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(experiments, "run_tables", interrupted)
+    code, out, err = call("tables", "7.3", "--out", "t")
+    assert code == 130 and not err and "t/cells" in out
 
 
 # --- Ctrl-C

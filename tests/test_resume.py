@@ -176,3 +176,29 @@ def test_a_changed_archive(archive, name, value):
 )
 def test_a_resumed_run_takes_no_other_settings(call, archive, option):
     assert option[0] in complaint(call, "--resume", archive, *option)
+
+
+def test_a_resumed_run_keeps_its_answers_where_it_was_told(call, tmp_path):
+    assert call("--domain", "lqr", "--max-solves", 3, "--no-record", "--archive", "a.npz")[0] == 1
+    resumed = ("--resume", "a.npz", "--archive", "b.npz", "--max-solves", 1, "--no-record")
+    assert "--resume b.npz" in call(*resumed)[1]
+    first, second = load_run(tmp_path / "a.npz"), load_run(tmp_path / "b.npz")
+    assert len(first.answers) == len(second.answers) == 3
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("w_expert", np.ones(2)),
+        ("true_mu", np.ones(2)),
+        ("evaluated_0", np.ones((2, 2))),
+        ("sensitivity_0", np.full((3, 3), np.nan)),
+    ],
+)
+def test_archives_with_other_arrays_are_named(call, tmp_path, name, value):
+    assert call("--domain", "lqr", "--max-solves", 3, "--no-record", "--archive", "a.npz")[0] == 1
+    with np.load(tmp_path / "a.npz") as data:
+        arrays = {**data, name: value}
+    np.savez(tmp_path / "b.npz", **arrays)
+    code, _, err = call("--resume", "b.npz", "--no-record")
+    assert code == 2 and "not a run that this version can resume" in err

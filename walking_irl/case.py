@@ -63,8 +63,8 @@ class Setup:
         if self.expert not in EXPERTS:
             choices = " or ".join(EXPERTS)
             raise InvalidInputError(f"unknown expert {self.expert!r}; choose {choices}")
-        if self.seed < 0:
-            raise InvalidInputError(f"seed must be a whole number >= 0, got {self.seed}")
+        if not 0 <= self.seed < 2**63:
+            raise InvalidInputError(f"seed must be a whole number in [0, 2^63), got {self.seed}")
         if self.max_solves < 1:
             raise InvalidInputError(f"max-solves must be at least 1, got {self.max_solves}")
 

@@ -90,9 +90,9 @@ def _recover_parser(p: argparse.ArgumentParser) -> None:
     own("--seed", type=int, help="draws the hidden weights (0)")
     own("--weights", metavar="W1,W2,...", help="hidden weights of your own")
     own("--demonstration", type=Path, metavar="FILE", help="a gait (.npz or .csv)")
-    setting("--population", help="typical or uniform (typical)")
-    setting("--rollouts", type=int, help="recorded walks; 0: exact (20)")
-    setting("--noise", type=float, help="s.d. of joint velocities [rad/s] (0.02)")
+    setting("--population", help="of a humanoid: typical or uniform (typical)")
+    setting("--rollouts", type=int, help="recorded walks of a humanoid; 0: exact (20)")
+    setting("--noise", type=float, help="their s.d. of joint velocities [rad/s] (0.02)")
     setting("--disturbance", help="initial, or kicks in every cycle (initial)")
     setting("--max-solves", type=int, help="budget of forward solves (20)")
     p.add_argument(
@@ -132,7 +132,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         return _run(_joined(sys.argv[1:] if argv is None else argv))
     except KeyboardInterrupt:
-        return _complain("interrupted before there was anything to save", INTERRUPTED)
+        return _complain("interrupted before there was a result", INTERRUPTED)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # the reader of our output has left
         return FAILED

@@ -45,18 +45,26 @@ def replace_file(path: Path, content: bytes) -> None:
         raise
 
 
-def check_outputs(paths: Sequence[Path | None]) -> None:
+def check_outputs(paths: Sequence[Path | None], inputs: Sequence[Path | None] = ()) -> None:
     """Fail before long work where a result could not be written after it.
 
+    Args:
+        paths: Files that will be written.
+        inputs: Files that are read, and must stay as they are.
+
     Raises:
-        InvalidInputError: If a folder is missing or read-only, two results have one name, or a name
-            is a folder's or a device's.
+        InvalidInputError: If a folder is missing or read-only, two results have one name or an
+            input's, or a name is a folder's or a device's.
     """
     given = [path for path in paths if path is not None]
+    read = [path.resolve() for path in inputs if path is not None]
+    written = [path.resolve() for path in given]
     for path in given:
         _check_name(path)
-        if given.count(path) > 1:
+        if written.count(path.resolve()) > 1:
             raise InvalidInputError(f"two results cannot both be written to {path}; name two files")
+        if path.resolve() in read:
+            raise InvalidInputError(f"{path} is read; name another file for the result")
         if not os.access(path.parent, os.W_OK):
             raise InvalidInputError(f"cannot write {path}: the folder {path.parent} is read-only")
 

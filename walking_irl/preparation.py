@@ -11,6 +11,9 @@ from walking_irl.domains import load
 from walking_irl.errors import InvalidInputError
 from walking_irl.types import Array
 
+WALKERS_ONLY = ("population", "rollouts", "noise", "disturbance")
+"""Settings of a recorded humanoid."""
+
 
 def prepare(setup: Setup, executor: Executor | None) -> Case:
     """Make the expert: solve for its policy, record it; or read the demonstration.
@@ -26,6 +29,12 @@ def prepare(setup: Setup, executor: Executor | None) -> Case:
         return case_of(setup, humanoid_subject(domain, setup, executor), executor)
     if setup.demonstration is not None:
         raise InvalidInputError(f"domain {setup.domain} takes no demonstration files")
+    usual = Setup()
+    unknown = [name for name in WALKERS_ONLY if getattr(setup, name) != getattr(usual, name)]
+    if unknown:
+        raise InvalidInputError(
+            f"domain {setup.domain} takes no {', '.join(unknown)}: its experts are known exactly"
+        )
     rng = np.random.default_rng(setup.seed)
     K = len(domain.objectives)
     w_E = _given(setup, K) if setup.weights else rng.dirichlet(np.ones(K))
@@ -58,6 +67,7 @@ def _given(setup: Setup, n: int) -> Array:
     w = np.asarray(setup.weights, dtype=float)
     if w.shape != (n,):
         raise InvalidInputError(f"{setup.domain} has {n} objectives, got {w.size} weights")
-    if not np.isfinite(w).all() or (w < 0).any() or w.sum() <= 0:
+    if not np.isfinite(w).all() or (w < 0).any() or not w.any():
         raise InvalidInputError(f"weights must be finite, >= 0 and not all zero, got {w.tolist()}")
+    w = w / w.max()  # against overflow
     return np.asarray(w / w.sum())

@@ -45,6 +45,7 @@ class Report:
         seconds: Wall time by part [s].
         recording: Path of the recording, if there is one.
         was_interrupted: Whether Ctrl-C ended it.
+        failure: Why a solver ended it, or nothing.
         archive: Path of the file that the run can be resumed from, if there is one.
         failed_write: Why the recording or that file could not be written, or None.
     """
@@ -62,6 +63,7 @@ class Report:
     seconds: dict[str, float] = field(default_factory=dict)
     recording: str | None = None
     was_interrupted: bool = False
+    failure: str = ""
     archive: str | None = None
     failed_write: WalkingIRLError | None = None
 
@@ -89,6 +91,8 @@ class Report:
     @property
     def status(self) -> str:
         """Why the run ended, in one sentence."""
+        if self.failure:
+            return f"a forward solve failed: {self.failure}"
         return INTERRUPTED if self.was_interrupted else self.ending.value
 
     @property
@@ -99,7 +103,7 @@ class Report:
     @property
     def is_success(self) -> bool:
         """Whether the run answers what the expert walks for."""
-        return not self.was_interrupted and self.ending in SUCCESS
+        return not self.was_interrupted and not self.failure and self.ending in SUCCESS
 
     @property
     def contains_expert(self) -> bool | None:

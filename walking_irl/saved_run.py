@@ -121,7 +121,7 @@ def load_run(path: Path) -> SavedRun:
         raise InvalidInputError(f"{path} is not a readable run: {error}") from error
     try:
         return _unpacked(arrays)
-    except (*UNREADABLE, InvalidInputError) as error:
+    except (*UNREADABLE, IndexError, InvalidInputError) as error:
         raise InvalidInputError(
             f"{path} is not a run that this version can resume ({error}); give the archive that "
             "walking-irl recover wrote beside its recording"
@@ -143,7 +143,9 @@ def _unpacked(arrays: dict[str, Any]) -> SavedRun:
         n_samples=int(about["n_samples"]),
         demonstration=domain.unpack(arrays["demonstration"]),
     )
-    w_expert, true_mu = arrays.get("w_expert"), arrays.get("true_mu")
+    w_expert, true_mu = (
+        _finite(arrays[name], K) if name in arrays else None for name in ("w_expert", "true_mu")
+    )
     subject = Subject(expert, domain.unpack(arrays["policy"]), w_expert, true_mu)
     answers = [
         (
@@ -151,8 +153,10 @@ def _unpacked(arrays: dict[str, Any]) -> SavedRun:
             Response(
                 policy=domain.unpack(arrays[f"policy_{i}"]),
                 mu=_finite(arrays[f"mu_{i}"], K),
-                sensitivity=arrays.get(f"sensitivity_{i}"),
-                evaluated=arrays[f"evaluated_{i}"],
+                sensitivity=_finite(arrays[f"sensitivity_{i}"], K, K)
+                if f"sensitivity_{i}" in arrays
+                else None,
+                evaluated=_table(arrays[f"evaluated_{i}"], K),
                 info=info,
             ),
         )
@@ -170,10 +174,19 @@ def _setup(given: dict[str, Any]) -> Setup:
         given["weights"] = tuple(given["weights"])
     if given["demonstration"] is not None:
         given["demonstration"] = Path(given["demonstration"])
+    for name, usual in asdict(Setup()).items():
+        if type(usual) in (int, str) and type(given.get(name, usual)) is not type(usual):
+            raise InvalidInputError(f"its setting {name} is {given[name]!r}")
     return Setup(**given)
 
 
-def _finite(array: Array, K: int) -> Array:
-    if array.shape != (K,) or not np.isfinite(array).all():
-        raise InvalidInputError(f"expected {K} finite numbers, got shape {array.shape}")
+def _finite(array: Array, *shape: int) -> Array:
+    if array.shape != shape or not np.isfinite(array).all():
+        raise InvalidInputError(f"expected finite numbers of shape {shape}, got {array.shape}")
+    return array
+
+
+def _table(array: Array, K: int) -> Array:
+    if array.size and (array.ndim != 2 or array.shape[1] != K):
+        raise InvalidInputError(f"expected policies of shape (n, {K}), got {array.shape}")
     return array

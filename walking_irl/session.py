@@ -7,7 +7,7 @@ import signal
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from copy import copy
 from multiprocessing import get_context
 from typing import Any
@@ -16,7 +16,7 @@ import numpy as np
 
 from walking_irl.case import Case, Setup
 from walking_irl.cpirl import cpirl
-from walking_irl.errors import InvalidInputError, RecordingError
+from walking_irl.errors import FallError, InvalidInputError, RecordingError, SolverError
 from walking_irl.preparation import case_of, prepare
 from walking_irl.report import Report
 from walking_irl.saved_run import Remembering, SavedRun, save_run
@@ -121,9 +121,9 @@ def run(
 ) -> Report:
     """Recover the weights of one expert.
 
-    Ctrl-C after the first iteration ends the run with a report of what is done, marked
-    interrupted; the recording is complete up to there. A recording that cannot be written at the
-    end is told by the report, too, so that the result is not lost with it.
+    Ctrl-C after the first iteration, or a solver that fails then, ends the run with a report of
+    what is done, marked so; the recording is complete up to there. A recording that cannot be
+    written at the end is told by the report, too, so that the result is not lost with it.
 
     Args:
         setup: What to do.
@@ -160,24 +160,35 @@ def run(
         expert=subject.expert,
         true_mu=subject.true_mu,
     )
-    n_saved = 0 if saved is None else len(saved.answers)
+    n_saved = 0
+    if saved is not None:
+        n_saved = len(saved.answers)
+        if setup.archive is not None:  # it may be another file than the one that was read
+            save_run(setup.archive, SavedRun(setup, subject, saved.answers))
+            report.archive = str(setup.archive)
     try:
-        try:
-            _learn(setup, case, report, watch, n_saved, executor, on_iteration)
-        except RecordingError as error:
-            if not report.iterations:
-                raise
-            report.failed_write, report.recording = error, None
-        report.recovered_mu = case.forward(report.w).mu if report.w_expert is not None else None
-    except KeyboardInterrupt as interrupt:
+        _learn(setup, case, report, watch, n_saved, executor, on_iteration)
+    except (KeyboardInterrupt, SolverError, FallError, RecordingError) as problem:
         if not report.iterations:
             raise
-        report.was_interrupted = True
-        notes = getattr(interrupt, "__notes__", [])  # of a recording that could not be written
-        if notes:
-            report.failed_write, report.recording = RecordingError(notes[0]), None
+        _tell(problem, report)
+    if report.w_expert is not None and not report.was_interrupted:
+        with suppress(KeyboardInterrupt, SolverError, FallError):  # the result does not hang on it
+            report.recovered_mu = case.forward(report.w).mu
     report.seconds = watch.finish()
     return report
+
+
+def _tell(problem: BaseException, report: Report) -> None:
+    """Let the report tell why the run was cut short, or its recording not written."""
+    if isinstance(problem, RecordingError):
+        report.failed_write, report.recording = problem, None
+        return
+    report.was_interrupted = isinstance(problem, KeyboardInterrupt)
+    report.failure = "" if report.was_interrupted else str(problem)
+    notes = getattr(problem, "__notes__", [])  # of a recording that could not be written
+    if notes:
+        report.failed_write, report.recording = RecordingError(notes[0]), None
 
 
 def _learn(
@@ -243,12 +254,12 @@ def _keep(setup: Setup, case: Case, report: Report, n_saved: int) -> None:
     """Save the run so far; where that fails, the run goes on, and the report tells of it."""
     if setup.archive is None or report.failed_write is not None:
         return
-    report.archive = str(setup.archive)
     if len(report.iterations) <= n_saved:  # an interrupt here must not shorten what is there
         return
     answers = [(it.w, it.response) for it in report.iterations]
     try:
         save_run(setup.archive, SavedRun(setup, case.subject, answers))
+        report.archive = str(setup.archive)
     except InvalidInputError as error:
         report.failed_write, report.archive = error, None
 

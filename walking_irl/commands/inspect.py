@@ -18,7 +18,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
     """``walking-irl inspect``."""
     from walking_irl.recording.reader import inspect_recording
 
-    check_outputs([args.json])
+    check_outputs([args.json], inputs=[args.file])
     content = inspect_recording(args.file)
     if args.json is not None:
         write_json(args.json, content)

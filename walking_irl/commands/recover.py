@@ -41,8 +41,12 @@ def run(args: argparse.Namespace, console: Console) -> int:
     setup = _setup(args, None if saved is None else saved.setup)
     check_ending(setup.record, ".rrd")
     check_ending(setup.archive, ".npz")
-    walks = None if setup.record is None else setup.record.with_suffix(".npz")
-    check_outputs([setup.record, walks, setup.archive, args.json])
+    has_walks = setup.record is not None and setup.domain.startswith("humanoid")
+    walks = setup.record.with_suffix(".npz") if has_walks and setup.record is not None else None
+    outputs = [setup.record, walks, setup.archive, args.json]
+    check_outputs(outputs, inputs=[setup.demonstration])
+    if args.resume is not None:  # its archive goes on in the same file
+        check_outputs([setup.record, walks, args.json], inputs=[args.resume])
     load(setup.domain)
     if not args.quiet:
         source = "solving for" if saved is None else f"{args.resume} knows"
@@ -56,11 +60,15 @@ def run(args: argparse.Namespace, console: Console) -> int:
             on_expert=terminal.expert,
             on_iteration=terminal.iteration,
         )
+    failure = report.failed_write
+    if args.json is not None:  # before the terminal, whose reader may leave
+        try:
+            write_json(args.json, report.to_json())
+        except InvalidInputError as error:
+            failure = failure or error
     show_report(report, console, terminal.walks_written)
-    if args.json is not None:
-        write_json(args.json, report.to_json())
-    if report.failed_write is not None:
-        raise report.failed_write
+    if failure is not None:
+        raise failure
     if report.was_interrupted:
         return INTERRUPTED
     return 0 if report.is_success else 1

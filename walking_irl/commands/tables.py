@@ -9,6 +9,8 @@ from rich.markup import escape
 
 from walking_irl.session import workers
 
+INTERRUPTED = 130
+
 
 def run(args: argparse.Namespace, console: Console) -> int:
     """``walking-irl tables``."""
@@ -18,10 +20,17 @@ def run(args: argparse.Namespace, console: Console) -> int:
         if not args.quiet:
             console.print(f"table {name}: {done} of {total} runs")
 
-    with workers() as executor:
-        paths = run_tables(
-            args.names, seeds=args.seeds, out=args.out, executor=executor, progress=progress
+    try:
+        with workers() as executor:
+            paths = run_tables(
+                args.names, seeds=args.seeds, out=args.out, executor=executor, progress=progress
+            )
+    except KeyboardInterrupt:
+        console.print(
+            f"interrupted; finished runs are kept in {escape(str(args.out / 'cells'))}: the same "
+            "command goes on from there"
         )
+        return INTERRUPTED
     for path in paths:
         console.print(escape(str(path)))
     return 0

@@ -29,7 +29,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
         console.print("the viewer is opening; move the frame slider to play")
     else:
         check_ending(args.png, ".png")
-        check_outputs([args.png])
+        check_outputs([args.png], inputs=[args.file])
         save_screenshot(args.file, args.png, frame=args.frame)
         console.print(f"wrote {escape(str(args.png))}")
     return 0

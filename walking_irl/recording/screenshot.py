@@ -94,9 +94,11 @@ def _show(viewer: ViewerClient, frame: int | None) -> None:
         if time.monotonic() > deadline:
             raise TimeoutError(f"not loaded after {LOAD_SECONDS:.0f} s")
         time.sleep(0.2)
-    if frame is None:
-        ends = [t.end for t in state.recordings[0].timelines if t.name == "frame"]
-        frame = int(ends[0]) if ends and ends[0] is not None else 0
+    ends = [t.end for t in state.recordings[0].timelines if t.name == "frame"]
+    last = int(ends[0]) if ends and ends[0] is not None else 0
+    frame = last if frame is None else frame
+    if not 0 <= frame <= last:
+        raise RecordingError(f"frame must lie in [0, {last}], got {frame}")
     viewer.set_time("frame", sequence=frame, play_state="paused")
 
 

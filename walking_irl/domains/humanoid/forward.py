@@ -48,8 +48,9 @@ def check_weights(w: Array) -> Array:
     names = ", ".join(o.name for o in OBJECTIVES)
     if w.shape != (len(OBJECTIVES),):
         raise InvalidInputError(f"expected {len(OBJECTIVES)} weights ({names}), got {w.size}")
-    if not np.isfinite(w).all() or (w < 0).any() or w.sum() <= 0:
+    if not np.isfinite(w).all() or (w < 0).any() or not w.any():
         raise InvalidInputError(f"weights must be finite, >= 0 and not all zero, got {w.tolist()}")
+    w = w / w.max()  # against overflow
     return np.asarray(w / w.sum())
 
 
