@@ -218,7 +218,7 @@ def test_how_sure_a_recovery_is_is_read_back_and_told(recorded: Recording) -> No
     np.testing.assert_allclose(found["bracket"], [-last.certificate, last.best_regret])
     assert found["volume_ratio"] == pytest.approx(expected.volume_ratio)
     assert 0.0 < found["volume_ratio"] < 1.0
-    assert f"{expected.volume_ratio:.1e} is left" in recorded.summary
+    assert f"leave {expected.volume_ratio:.1e} of the volume of all" in recorded.summary
     np.testing.assert_array_equal(found["noise"], np.zeros(6))
     assert found["condition_number"] is None and found["weakest"] is None  # no sensitivity known
     low, high = physical[5]
