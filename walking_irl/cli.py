@@ -21,9 +21,8 @@ from pathlib import Path
 from typing import NoReturn
 
 from walking_irl import __version__
+from walking_irl.commands import BAD_INPUT, FAILED, INTERRUPTED
 from walking_irl.errors import EmptyPolyhedronError, InvalidInputError, WalkingIRLError
-
-DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 EXAMPLES = """
 examples:

@@ -98,14 +98,14 @@ def _until_reached(
 
 def _ends(guide: Guide, level: float) -> Iterator[tuple[Array, WeightPolyhedron]]:
     """Ends of the intervals that are not reached yet; each must be answered before the next."""
-    archive = guide.archive
+    archive, lift = guide.archive, guide.probe_lift(level)
     for direction in np.vstack([np.eye(archive.K), -np.eye(archive.K)]):
         for _ in range(MOST_PROBES):
-            P = archive.polyhedron(guide.probe_lift(level))
+            P = archive.polyhedron(lift)
             w = P.support(direction)[1]
             if np.abs(archive.W - w).max(axis=1).min() <= 1e-9:
                 break
             yield w, P
             f = float(archive.robust_regrets(w[None])[0]) - archive.expert.suboptimality
-            if f <= REACHED * float(w @ guide.probe_lift(level)):
+            if f <= REACHED * float(w @ lift):
                 break

@@ -39,5 +39,5 @@ def analytic(
     m = len(used_slack)
     root = solve_triangular(R, np.eye(len(z)))
     # Rows left out of the barrier are satisfied, but may pass through its ellipsoid E(1).
-    inner = float(np.min((P.b - P.A @ z) / np.linalg.norm(P.A @ root, axis=1)))
+    inner = float(P.relevance().min())
     return Centre(feasible_weights(P, z), z, root @ root.T, min(1.0, inner), math.sqrt(m * (m - 1)))

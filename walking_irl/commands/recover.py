@@ -23,6 +23,7 @@ from rich.table import Table
 
 from walking_irl import session
 from walking_irl.case import Case, Setup
+from walking_irl.commands import DONE, FAILED, INTERRUPTED
 from walking_irl.commands.weights import parse_weights, show_weights
 from walking_irl.domains import load
 from walking_irl.errors import InvalidInputError
@@ -32,8 +33,6 @@ from walking_irl.report import Report, write_json
 from walking_irl.saved_run import load_run
 from walking_irl.types import Iteration, Rollout, Rule
 
-INTERRUPTED = 130
-
 
 def run(args: argparse.Namespace, console: Console) -> int:
     """``walking-irl recover``."""
@@ -41,8 +40,9 @@ def run(args: argparse.Namespace, console: Console) -> int:
     setup = _setup(args, None if saved is None else saved.setup)
     check_ending(setup.record, ".rrd")
     check_ending(setup.archive, ".npz")
-    has_walks = setup.record is not None and setup.domain.startswith("humanoid")
-    walks = setup.record.with_suffix(".npz") if has_walks and setup.record is not None else None
+    walks = None
+    if setup.record is not None and setup.domain.startswith("humanoid"):
+        walks = setup.record.with_suffix(".npz")
     outputs = [setup.record, walks, setup.archive, args.json]
     check_outputs(outputs, inputs=[setup.demonstration])
     if args.resume is not None:  # its archive goes on in the same file
@@ -71,7 +71,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
         raise failure
     if report.was_interrupted:
         return INTERRUPTED
-    return 0 if report.is_success else 1
+    return DONE if report.is_success else FAILED
 
 
 class _Terminal:

@@ -7,9 +7,8 @@ import argparse
 from rich.console import Console
 from rich.markup import escape
 
+from walking_irl.commands import DONE, INTERRUPTED
 from walking_irl.session import workers
-
-INTERRUPTED = 130
 
 
 def run(args: argparse.Namespace, console: Console) -> int:
@@ -33,4 +32,4 @@ def run(args: argparse.Namespace, console: Console) -> int:
         return INTERRUPTED
     for path in paths:
         console.print(escape(str(path)))
-    return 0
+    return DONE
