@@ -24,12 +24,12 @@ import numpy as np
 from bench import medians, seconds, table, verdict
 from scipy.optimize import linprog
 
-from walking_irl.centres import CENTRES, Centre
-from walking_irl.centres.ellipsoid import cvxpy_ellipsoid
-from walking_irl.centres.gravity import gravity
-from walking_irl.halfspaces import whitened_rows
-from walking_irl.polyhedron import WeightPolyhedron, plane_basis
-from walking_irl.types import Array
+from walking_irl.arrays import Array
+from walking_irl.geometry.centres import CENTRES, Centre
+from walking_irl.geometry.centres.ellipsoid import cvxpy_ellipsoid
+from walking_irl.geometry.centres.gravity import gravity
+from walking_irl.geometry.halfspaces import whitened_rows
+from walking_irl.geometry.polyhedron import WeightPolyhedron, plane_basis
 
 DIMENSIONS, FACETS = (3, 5, 10, 20), (50, 200)
 TARGET = 5.0

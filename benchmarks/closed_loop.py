@@ -18,14 +18,14 @@ from typing import NamedTuple
 import numpy as np
 from bench import table, verdict
 
-from walking_irl.domains.humanoid.anatomy import Walker, load_walker
+from walking_irl.domains.humanoid.body.anatomy import Walker, load_walker
+from walking_irl.domains.humanoid.closed_loop.environment import Push
+from walking_irl.domains.humanoid.closed_loop.policy import TrackingPolicy, tracking_policy
+from walking_irl.domains.humanoid.closed_loop.rollout import rollout
 from walking_irl.domains.humanoid.domain import Humanoid
-from walking_irl.domains.humanoid.gait import Gait
-from walking_irl.domains.humanoid.library import load_gaits
-from walking_irl.domains.humanoid.policy import TrackingPolicy, tracking_policy
+from walking_irl.domains.humanoid.gait.gait import Gait
+from walking_irl.domains.humanoid.gait.library import load_gaits
 from walking_irl.domains.humanoid.population import uniform_weights
-from walking_irl.domains.humanoid.rollout import rollout
-from walking_irl.domains.humanoid.task import Push
 from walking_irl.errors import FallError
 
 UNIFORM_SEEDS = (100, 101)

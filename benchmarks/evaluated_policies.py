@@ -26,20 +26,21 @@ from unittest import mock
 import numpy as np
 from bench import table
 
-from walking_irl.centres import CENTRES
-from walking_irl.cpirl import cpirl
-from walking_irl.domains.gridworld import Gridworld
+from walking_irl.arrays import Array
+from walking_irl.cpirl.loop import cpirl
+from walking_irl.cpirl.stopping import IntervalsNarrowerThan
+from walking_irl.domains.humanoid.closed_loop.trials import Protocol
 from walking_irl.domains.humanoid.domain import Humanoid
-from walking_irl.domains.humanoid.forward import solver_for
-from walking_irl.domains.humanoid.library import load_library
+from walking_irl.domains.humanoid.gait.library import load_library
+from walking_irl.domains.humanoid.learner import solver_for
 from walking_irl.domains.humanoid.population import typical_weights
-from walking_irl.domains.humanoid.protocol import Protocol
 from walking_irl.domains.lqr import LQR
-from walking_irl.domains.walking_path import SCALES, WalkingPath
-from walking_irl.humanoid_case import MIN_WEIGHT
-from walking_irl.solvers.finite_mdp import FiniteMDP
-from walking_irl.stopping import IntervalsNarrowerThan
-from walking_irl.types import Array, Expert, Forward, Response, Status
+from walking_irl.domains.mdp.gridworld import Gridworld
+from walking_irl.domains.path.walking_path import SCALES, WalkingPath
+from walking_irl.geometry.centres import CENTRES
+from walking_irl.rl.finite_mdp import FiniteMDP
+from walking_irl.run.humanoid_case import MIN_WEIGHT
+from walking_irl.types import Expert, Forward, Response, Status
 
 MOST = 100
 """Solves of one recovery."""

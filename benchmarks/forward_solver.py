@@ -18,13 +18,13 @@ import numpy as np
 from bench import medians, table, verdict
 from mujoco import minimize
 
-from walking_irl.domains.humanoid.anatomy import load_walker
-from walking_irl.domains.humanoid.forward import NUDGE, solver_for
-from walking_irl.domains.humanoid.library import load_library
-from walking_irl.domains.humanoid.linearisation import weighted
-from walking_irl.domains.humanoid.solver import FD_STEPS, GaitSolver, Stage, stage
-from walking_irl.domains.humanoid.transcription import ROOT_PENALTY
-from walking_irl.types import Array
+from walking_irl.arrays import Array
+from walking_irl.domains.humanoid.body.anatomy import load_walker
+from walking_irl.domains.humanoid.gait.library import load_library
+from walking_irl.domains.humanoid.learner import NUDGE, solver_for
+from walking_irl.domains.humanoid.optimiser.linearisation import weighted
+from walking_irl.domains.humanoid.optimiser.solver import FD_STEPS, GaitSolver, Stage, stage
+from walking_irl.domains.humanoid.optimiser.transcription import ROOT_PENALTY
 
 MAX_OF_DERIVATIVES, MIN_OF_DENSE = 2.0, 15.0
 

@@ -18,19 +18,19 @@ from unittest import mock
 import numpy as np
 from bench import table, verdict
 
-from walking_irl.case import MAX_SOLVES
-from walking_irl.cpirl import cpirl
+from walking_irl.cpirl.loop import cpirl
 from walking_irl.domains.humanoid import domain as domain_module
 from walking_irl.domains.humanoid import solver as gait_solver
+from walking_irl.domains.humanoid.closed_loop.trials import Protocol, measure
 from walking_irl.domains.humanoid.domain import Humanoid, exact_expert
-from walking_irl.domains.humanoid.library import load_library
-from walking_irl.domains.humanoid.linearisation import Linearisation
-from walking_irl.domains.humanoid.normal_equations import Factor, NormalMatrix
+from walking_irl.domains.humanoid.gait.library import load_library
+from walking_irl.domains.humanoid.optimiser.linearisation import Linearisation
+from walking_irl.domains.humanoid.optimiser.normal_equations import Factor, NormalMatrix
+from walking_irl.domains.humanoid.optimiser.transcription import Transcription
 from walking_irl.domains.humanoid.population import typical_weights
-from walking_irl.domains.humanoid.protocol import Protocol, measure
-from walking_irl.domains.humanoid.transcription import Transcription
-from walking_irl.humanoid_case import MIN_WEIGHT
-from walking_irl.session import PROBE
+from walking_irl.run.case import MAX_SOLVES
+from walking_irl.run.humanoid_case import MIN_WEIGHT
+from walking_irl.run.session import PROBE
 from walking_irl.types import Expert, Iteration
 
 DERIVATIVES = "MuJoCo's inverse dynamics and derivatives"

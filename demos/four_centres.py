@@ -16,13 +16,14 @@ from pathlib import Path
 
 import numpy as np
 
-from walking_irl.centres import CENTRES
-from walking_irl.cpirl import cpirl
+from walking_irl.arrays import Array
+from walking_irl.cpirl.loop import cpirl
 from walking_irl.domains.lqr import LQR
 from walking_irl.errors import EmptyPolyhedronError
-from walking_irl.polyhedron import WeightPolyhedron
+from walking_irl.geometry.centres import CENTRES
+from walking_irl.geometry.polyhedron import WeightPolyhedron
 from walking_irl.recording import Experiment, Other, Recorder
-from walking_irl.types import Array, Response
+from walking_irl.types import Response
 
 NAMES = {
     "ac": "analytic centre",

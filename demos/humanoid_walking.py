@@ -12,15 +12,15 @@ from pathlib import Path
 
 import numpy as np
 
-from walking_irl.cpirl import cpirl
+from walking_irl.cpirl.loop import cpirl
+from walking_irl.cpirl.summary import summarise
+from walking_irl.domains.humanoid.closed_loop.trials import Protocol
 from walking_irl.domains.humanoid.domain import Humanoid
 from walking_irl.domains.humanoid.population import typical_weights
-from walking_irl.domains.humanoid.protocol import Protocol
-from walking_irl.humanoid_case import one_cycle
 from walking_irl.recording import Experiment, Recorder
-from walking_irl.recording.gait_view import WalkerView
-from walking_irl.recovery import summarise
-from walking_irl.session import workers
+from walking_irl.recording.views.gait import WalkerView
+from walking_irl.run.humanoid_case import one_cycle
+from walking_irl.run.session import workers
 
 MIN_WEIGHT = 0.005
 PROBE = 1e-4

@@ -13,18 +13,18 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 
-from walking_irl.commands.gait import png
+from walking_irl.cli.gait import png
+from walking_irl.domains.humanoid.costs.objectives import REFERENCE_WEIGHTS
 from walking_irl.domains.humanoid.domain import Humanoid
-from walking_irl.domains.humanoid.gait import Gait, whole_cycle
-from walking_irl.domains.humanoid.objectives import REFERENCE_WEIGHTS
-from walking_irl.domains.humanoid.render import SIDE, photograph
-from walking_irl.humanoid_case import one_cycle
-from walking_irl.output import write_file
+from walking_irl.domains.humanoid.gait.gait import Gait, whole_cycle
+from walking_irl.domains.humanoid.gait.pictures import SIDE, photograph
+from walking_irl.files import write_file
 from walking_irl.recording import Clock
 from walking_irl.recording.blueprint import motion_blueprint
-from walking_irl.recording.gait_view import WalkerView
+from walking_irl.recording.views.gait import WalkerView
 from walking_irl.recording.writer import FLUSH_SECONDS, open_stream
-from walking_irl.session import workers
+from walking_irl.run.humanoid_case import one_cycle
+from walking_irl.run.session import workers
 
 POSTURES = 6
 TIMES = 3.0

@@ -13,10 +13,10 @@ import argparse
 import sys
 from pathlib import Path
 
-from walking_irl.case import Setup
-from walking_irl.commands.recover import progress_line
-from walking_irl.report import Report
-from walking_irl.session import run, workers
+from walking_irl.cli.recover import progress_line
+from walking_irl.run.case import Setup
+from walking_irl.run.report import Report
+from walking_irl.run.session import run, workers
 from walking_irl.types import Status
 
 

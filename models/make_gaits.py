@@ -19,13 +19,13 @@ import mujoco
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from walking_irl.domains.humanoid.anatomy import Walker, load_walker
-from walking_irl.domains.humanoid.forward import polish, solver_for
-from walking_irl.domains.humanoid.gait import Gait
-from walking_irl.domains.humanoid.objectives import OBJECTIVES, REFERENCE_WEIGHTS
+from walking_irl.arrays import Array
+from walking_irl.domains.humanoid.body.anatomy import Walker, load_walker
+from walking_irl.domains.humanoid.costs.objectives import OBJECTIVES, REFERENCE_WEIGHTS
+from walking_irl.domains.humanoid.gait.gait import Gait
+from walking_irl.domains.humanoid.learner import polish, solver_for
+from walking_irl.domains.humanoid.optimiser.solver import stage
 from walking_irl.domains.humanoid.population import typical_weights
-from walking_irl.domains.humanoid.solver import stage
-from walking_irl.types import Array
 
 N_KNOTS = 40
 SPEED, HALF_PERIOD = 1.25, 0.55  # of the guess [m/s], [s]

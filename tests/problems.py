@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from walking_irl.arrays import Array
 from walking_irl.domains.lqr import LQR
-from walking_irl.polyhedron import WeightPolyhedron, plane_basis
-from walking_irl.types import Array, Expert, Response
+from walking_irl.geometry.polyhedron import WeightPolyhedron, plane_basis
+from walking_irl.types import Expert, Response
 
 
 @dataclass(frozen=True)

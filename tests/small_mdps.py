@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from walking_irl.domains.driving import Driving
-from walking_irl.domains.gridworld import Gridworld
+from walking_irl.domains.humanoid.closed_loop.trials import Protocol
+from walking_irl.domains.humanoid.closed_loop.trials import measure as walk_and_measure
 from walking_irl.domains.humanoid.domain import Humanoid
-from walking_irl.domains.humanoid.protocol import Protocol
-from walking_irl.domains.humanoid.protocol import measure as walk_and_measure
 from walking_irl.domains.lqr import LQR
-from walking_irl.domains.walking_path import SCALES, WalkingPath
-from walking_irl.solvers import FiniteMDP
+from walking_irl.domains.mdp.driving import Driving
+from walking_irl.domains.mdp.gridworld import Gridworld
+from walking_irl.domains.path.walking_path import SCALES, WalkingPath
+from walking_irl.rl import FiniteMDP
 
 
 def random_mdp(

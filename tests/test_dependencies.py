@@ -1,26 +1,25 @@
+"""Which package may import which; a rule a folder, so that a new file is held to it, too."""
+
 import ast
 import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import walking_irl
 
 ROOT = Path(walking_irl.__file__).parent
-CORE = [
-    "dual_simplex",
-    "gauge",
-    "halfspaces",
-    "polyhedron",
-    "certificates",
-    "newton",
-    "modeller",
-    "archive",
-    "guide",
-    "probing",
-    "snapshot",
-    "stopping",
-]
-UPPER = ["domains", "baselines", "recording", "experiments", "cli"]
+LEAVES = {"arrays", "errors", "types", "expert", "files", "versions"}
+ALLOWED = {
+    "geometry": {"arrays", "errors"},
+    "cpirl": LEAVES | {"geometry"},
+    "rl": LEAVES,
+    "domains": LEAVES | {"rl"},
+    "baselines": LEAVES | {"geometry", "cpirl", "rl"},
+    "recording": LEAVES | {"geometry", "cpirl", "domains"},
+}
+"""Packages of walking_irl that each folder may import, beside itself; the others may import all."""
 
 
 def imports(path):
@@ -29,22 +28,45 @@ def imports(path):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module:
-            yield node.module
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
 
 
-def uses(path, names):
-    return [m for m in imports(path) if any(m.startswith(f"walking_irl.{n}") for n in names)]
+def packages(path):
+    """Packages and flat modules of walking_irl that a file imports."""
+    own = [m.split(".") for m in imports(path)]
+    return {m[1] for m in own if m[0] == "walking_irl" and len(m) > 1} - {"__version__"}
 
 
-def test_core_knows_no_domain_recorder_or_command_line():
-    for path in [*(ROOT / f"{n}.py" for n in [*CORE, "cpirl"]), *(ROOT / "centres").glob("*.py")]:
-        assert not uses(path, UPPER), path
+@pytest.mark.parametrize("folder", ALLOWED)
+def test_a_package_imports_only_what_lies_below_it(folder):
+    for path in sorted((ROOT / folder).rglob("*.py")):
+        assert packages(path) - {folder} <= ALLOWED[folder], path
 
 
-def test_lower_layers_do_not_know_the_loop():
-    for path in [*(ROOT / f"{n}.py" for n in CORE), *(ROOT / "domains").rglob("*.py")]:
-        assert not uses(path, ["cpirl"]), path
-    assert not uses(ROOT / "polyhedron.py", ["centres", "certificates", "archive", "guide"])
+def graph():
+    """Folders and flat modules, and what each imports."""
+    edges = {}
+    for path in ROOT.rglob("*.py"):
+        name = path.relative_to(ROOT).parts[0].removesuffix(".py")
+        edges.setdefault(name, set()).update(packages(path) - {name})
+    return edges
+
+
+def test_packages_have_no_circles_and_few_levels():
+    edges, level = graph(), {}
+
+    def height(name, above=()):
+        assert name not in above, f"a circle: {' > '.join((*above, name))}"
+        if name not in level:
+            below = [height(other, (*above, name)) for other in edges.get(name, ())]
+            level[name] = 1 + max(below, default=0)
+        return level[name]
+
+    assert max(height(name) for name in edges) <= 10
+
+
+def test_few_modules_lie_flat():
+    assert len([p for p in ROOT.glob("*.py") if not p.name.startswith("__")]) <= 8
 
 
 def test_only_the_recorder_imports_rerun():
@@ -53,8 +75,9 @@ def test_only_the_recorder_imports_rerun():
             assert not [m for m in imports(path) if m.split(".")[0] == "rerun"], path
 
 
-def test_importing_the_algorithm_stays_light():
-    code = "import sys, walking_irl.cpirl; print(sorted(sys.modules))"
+@pytest.mark.parametrize("module", ["walking_irl", "walking_irl.cpirl", "walking_irl.geometry"])
+def test_importing_the_algorithm_stays_light(module):
+    code = f"import sys, {module}; print(sorted(sys.modules))"
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     for heavy in ("mujoco", "dm_control", "rerun", "cvxpy"):
         assert f"'{heavy}'" not in out.stdout

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from problems import without_sensitivity
 
-from walking_irl.archive import Archive
-from walking_irl.cpirl import cpirl
+from walking_irl.cpirl.bundle import Archive
+from walking_irl.cpirl.loop import cpirl
 from walking_irl.domains.lqr import LQR
 from walking_irl.errors import InvalidInputError
 from walking_irl.expert import (

@@ -86,8 +86,8 @@ def test_wheel_in_a_fresh_environment_finds_its_models(tmp_path):
         f"import sys; sys.path.append({str(packages)!r})\n"
         "from pathlib import Path\n"
         "import walking_irl\n"
-        "from walking_irl.domains.humanoid.library import load_gaits\n"
-        "from walking_irl.paths import model_path\n"
+        "from walking_irl.domains.humanoid.gait.library import load_gaits\n"
+        "from walking_irl.files import model_path\n"
         f"for name in {MODELS}: print(model_path(name))\n"
         "print(len(load_gaits(planar=True)))\n"
     )

@@ -2,7 +2,7 @@
 
 import sys
 
-from walking_irl.cli import main
+from walking_irl.cli.main import main
 
 if __name__ == "__main__":
     sys.exit(main())

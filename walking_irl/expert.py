@@ -13,8 +13,9 @@ from typing import Any, Literal
 import numpy as np
 from scipy.stats import t as student
 
+from walking_irl.arrays import Array
 from walking_irl.errors import InvalidInputError
-from walking_irl.types import Array, Expert, Response
+from walking_irl.types import Expert, Response
 
 Bound = Literal["student", "bernstein", "hoeffding"]
 

@@ -9,16 +9,16 @@ from __future__ import annotations
 import enum
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import Any, Literal, NamedTuple, Protocol, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from walking_irl.polyhedron import WeightPolyhedron
+from walking_irl.arrays import Array
+from walking_irl.geometry.polyhedron import WeightPolyhedron
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
+Mode = Literal["optimal", "set", "minimise"]
+"""Which weights explain an expert: regret 0, regret below a tolerance, or the least regret."""
+MODES: tuple[Mode, ...] = get_args(Mode)
 
 
 class Objective(NamedTuple):

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import nnls
 
-from walking_irl.certificates import game_lp
+from walking_irl.arrays import Array
 from walking_irl.errors import InvalidInputError
-from walking_irl.solvers.finite_mdp import FiniteMDP
-from walking_irl.types import Array, Response, Status
+from walking_irl.geometry.game import game_lp
+from walking_irl.rl.finite_mdp import FiniteMDP
+from walking_irl.types import Response, Status
 
 
 @dataclass(frozen=True)

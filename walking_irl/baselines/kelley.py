@@ -10,9 +10,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from walking_irl.arrays import Array
 from walking_irl.baselines.apprentice import Apprentice, checked_budget
-from walking_irl.certificates import game_lp
-from walking_irl.types import Array, Expert, Forward, Response, Status
+from walking_irl.geometry.game import game_lp
+from walking_irl.types import Expert, Forward, Response, Status
 
 
 def kelley(

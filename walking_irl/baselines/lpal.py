@@ -10,8 +10,8 @@ from scipy.optimize import linprog
 
 from walking_irl.baselines.apprentice import Apprentice
 from walking_irl.errors import InvalidInputError, SolverError
-from walking_irl.solvers.finite_mdp import FiniteMDP, normalised_occupancy
-from walking_irl.solvers.linear_program import flow_constraints
+from walking_irl.rl.finite_mdp import FiniteMDP, normalised_occupancy
+from walking_irl.rl.linear_program import flow_constraints
 from walking_irl.types import Expert, Response, Status
 
 

@@ -6,8 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from walking_irl.arrays import Array
 from walking_irl.baselines.apprentice import Apprentice, checked_budget, closest_mixture
-from walking_irl.types import Array, Expert, Forward, Response, Status
+from walking_irl.types import Expert, Forward, Response, Status
 
 
 def max_margin(

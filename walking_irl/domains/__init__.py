@@ -32,19 +32,19 @@ def _lqr(**options: Any) -> Any:
 
 
 def _gridworld(**options: Any) -> Any:
-    from walking_irl.domains.gridworld import Gridworld
+    from walking_irl.domains.mdp.gridworld import Gridworld
 
     return Gridworld(**{"cells": 3, **options})
 
 
 def _driving(**options: Any) -> Any:
-    from walking_irl.domains.driving import Driving
+    from walking_irl.domains.mdp.driving import Driving
 
     return Driving(**options)
 
 
 def _walking_path(**options: Any) -> Any:
-    from walking_irl.domains.walking_path import WalkingPath
+    from walking_irl.domains.path.walking_path import WalkingPath
 
     return WalkingPath(**options)
 

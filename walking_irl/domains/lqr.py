@@ -13,9 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import minimize
 
+from walking_irl.arrays import Array
 from walking_irl.domains.weights import checked_weights
 from walking_irl.errors import SolverError
-from walking_irl.types import Array, Expert, Objective, Response
+from walking_irl.types import Expert, Objective, Response
 
 SPOILT_BY = 0.25
 """Relative error of a sub-optimal expert's gains."""

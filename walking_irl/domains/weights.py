@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from walking_irl.arrays import Array
 from walking_irl.errors import InvalidInputError
-from walking_irl.types import Array
 
 
 def checked_weights(w: Array, n: int) -> Array:

@@ -1,7 +1,7 @@
 """Bare cutting planes with any centre, and the thesis's Algorithm 3 (utopia) for comparison.
 
-:func:`walking_irl.cpirl.cpirl` is the method to use; this loop only serves table rows that need
-another reference or another sampling of the centre.
+:func:`walking_irl.cpirl.loop.cpirl` is the method to use; this loop only serves table rows that
+need another reference or another sampling of the centre.
 """
 
 from __future__ import annotations
@@ -12,10 +12,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import linprog
 
-from walking_irl.centres.centre import CentreRule
+from walking_irl.arrays import Array
 from walking_irl.errors import EmptyPolyhedronError
-from walking_irl.polyhedron import WeightPolyhedron
-from walking_irl.types import Array, Expert, Forward, Response
+from walking_irl.geometry.centres.centre import CentreRule
+from walking_irl.geometry.polyhedron import WeightPolyhedron
+from walking_irl.types import Expert, Forward, Response
 
 STALL = 1e-10
 

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from walking_irl.arrays import Array
 from walking_irl.experiments.picture import solves_chart, steps_chart
-from walking_irl.report import write_json
-from walking_irl.types import Array
+from walking_irl.run.report import write_json
 from walking_irl.versions import versions
 
 COLUMNS = (

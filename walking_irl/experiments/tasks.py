@@ -10,22 +10,23 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from walking_irl.arrays import Array
 from walking_irl.baselines import kelley, lpal, max_margin, mwal, projection
-from walking_irl.centres import centre_rule
-from walking_irl.centres.gravity import gravity
-from walking_irl.certificates import game_lp
-from walking_irl.cpirl import cpirl
-from walking_irl.domains.driving import Driving
-from walking_irl.domains.finite import FiniteDomain
-from walking_irl.domains.gridworld import Gridworld
+from walking_irl.cpirl.loop import cpirl
+from walking_irl.domains.humanoid.closed_loop.trials import Protocol
 from walking_irl.domains.humanoid.domain import Humanoid
 from walking_irl.domains.humanoid.population import typical_weights
-from walking_irl.domains.humanoid.protocol import Protocol
 from walking_irl.domains.lqr import LQR
-from walking_irl.domains.walking_path import WalkingPath
+from walking_irl.domains.mdp.driving import Driving
+from walking_irl.domains.mdp.finite import FiniteDomain
+from walking_irl.domains.mdp.gridworld import Gridworld
+from walking_irl.domains.path.walking_path import WalkingPath
 from walking_irl.errors import InvalidInputError, WalkingIRLError
 from walking_irl.experiments.cutting import cutting_planes
-from walking_irl.types import Array, Expert, Response
+from walking_irl.geometry.centres import centre_rule
+from walking_irl.geometry.centres.gravity import gravity
+from walking_irl.geometry.game import game_lp
+from walking_irl.types import Expert, Response
 
 DOMINANCE_TOL = 1e-9
 """Relative slack of "at least as good in every feature": rounding only."""

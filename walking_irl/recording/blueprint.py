@@ -18,7 +18,7 @@ from walking_irl.recording.progress_view import (
     share_path,
     weight_path,
 )
-from walking_irl.recording.world import WorldView
+from walking_irl.recording.views.view import WorldView
 
 
 def blueprint(experiment: Experiment, world: WorldView[Any] | None) -> rrb.Blueprint:

@@ -6,8 +6,8 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
+from walking_irl.arrays import Array
 from walking_irl.recording import style
-from walking_irl.types import Array
 
 NO_RADIUS = rr.Radius.ui_points([0.0])
 

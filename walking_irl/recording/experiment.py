@@ -10,9 +10,10 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
+from walking_irl.arrays import Array
 from walking_irl.errors import InvalidInputError
 from walking_irl.recording.style import OTHERS, PLAYBACK_RATE
-from walking_irl.types import Array, Expert, Objective
+from walking_irl.types import Expert, Objective
 
 
 class Other(NamedTuple):

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from walking_irl.errors import RecordingError
-from walking_irl.output import part_of, replace_file
+from walking_irl.files import part_of, replace_file
 
 
 def check_writable(path: str | Path) -> Path:

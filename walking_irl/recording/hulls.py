@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from walking_irl.types import Array
+from walking_irl.arrays import Array
 
 COPLANAR = 1e-6
 """Faces whose unit normals differ by less are one face (after scaling to unit size)."""

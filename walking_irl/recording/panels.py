@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from walking_irl.types import Array
+from walking_irl.arrays import Array
 
 TRIANGLE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, math.sqrt(0.75), 0.0]])
 TETRAHEDRON = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / math.sqrt(8) + 0.5

@@ -16,13 +16,14 @@ import rerun as rr
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from walking_irl.arrays import Array
 from walking_irl.errors import EmptyPolyhedronError
 from walking_irl.recording import style
 from walking_irl.recording.drawing import text_3d
 from walking_irl.recording.experiment import Clock, Experiment, Other
 from walking_irl.recording.hulls import Hull, faces_lost, hull
 from walking_irl.recording.panels import Panel, panels
-from walking_irl.types import Array, Iteration
+from walking_irl.types import Iteration
 
 LENS_RADIUS = 0.32
 LENS_CENTRE = np.array([-0.2, -0.2, -0.72])

@@ -8,10 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 import rerun as rr
 
+from walking_irl.arrays import Array
 from walking_irl.recording import style
 from walking_irl.recording.drawing import text_2d
 from walking_irl.recording.experiment import Clock, Experiment, Other
-from walking_irl.types import Array, Iteration
+from walking_irl.types import Iteration
 
 ROW = 0.105
 """Height of an objective's row among the interval bars, in units of the axis 0..1."""

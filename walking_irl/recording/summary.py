@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from walking_irl.cpirl.summary import Recovery, noise_level, per_unit, volume_left
 from walking_irl.recording.experiment import Experiment
 from walking_irl.recording.panels import panels
-from walking_irl.recovery import Recovery, noise_level, per_unit, volume_left
 from walking_irl.types import Status
 from walking_irl.versions import versions
 

@@ -9,6 +9,7 @@ from typing import Generic, Self, TypeVar
 
 import rerun as rr
 
+from walking_irl.cpirl.summary import summarise
 from walking_irl.errors import RecordingError
 from walking_irl.recording.blueprint import blueprint, motion_blueprint
 from walking_irl.recording.experiment import Clock, Experiment, Other
@@ -17,8 +18,7 @@ from walking_irl.recording.polyhedron_view import PolyhedronView
 from walking_irl.recording.progress_view import ProgressView
 from walking_irl.recording.style import PLAYBACK_RATE
 from walking_irl.recording.summary import properties, summary
-from walking_irl.recording.world import WorldView
-from walking_irl.recovery import summarise
+from walking_irl.recording.views.view import WorldView
 from walking_irl.types import Iteration
 
 APPLICATION_ID = "walking_irl"

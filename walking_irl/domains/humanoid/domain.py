@@ -7,18 +7,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from walking_irl.domains.humanoid.anatomy import Walker, load_walker
-from walking_irl.domains.humanoid.demonstrator import OptimalGait, best_gait
-from walking_irl.domains.humanoid.forward import Imitator, search, solver_for
-from walking_irl.domains.humanoid.gait import Gait
-from walking_irl.domains.humanoid.objectives import OBJECTIVES
-from walking_irl.domains.humanoid.policy import tracking_policy
-from walking_irl.domains.humanoid.protocol import MANY, Measurement, Protocol, measure
-from walking_irl.domains.humanoid.rollout import averaged_gait
-from walking_irl.domains.humanoid.solver import Solution, stage
+from walking_irl.arrays import Array
+from walking_irl.domains.humanoid.body.anatomy import Walker, load_walker
+from walking_irl.domains.humanoid.closed_loop.policy import tracking_policy
+from walking_irl.domains.humanoid.closed_loop.rollout import averaged_gait
+from walking_irl.domains.humanoid.closed_loop.trials import MANY, Measurement, Protocol, measure
+from walking_irl.domains.humanoid.costs.objectives import OBJECTIVES
+from walking_irl.domains.humanoid.expert_search import OptimalGait, best_gait
+from walking_irl.domains.humanoid.gait.gait import Gait
+from walking_irl.domains.humanoid.learner import Imitator, search, solver_for
+from walking_irl.domains.humanoid.optimiser.solver import Solution, stage
 from walking_irl.errors import SolverError
 from walking_irl.expert import expert_from_returns
-from walking_irl.types import Array, Expert, Objective, Response, Rollout
+from walking_irl.types import Expert, Objective, Response, Rollout
 
 SPOILT_BY = np.deg2rad(1.0)
 """First amplitude of the shake that spoils a gait [rad]."""

@@ -1,0 +1,169 @@
+"""The environment keeps dm_control's contract, and its rewards add up to the objectives."""
+
+import numpy as np
+import pytest
+
+from walking_irl.domains.humanoid.body.anatomy import load_walker
+from walking_irl.domains.humanoid.closed_loop.environment import (
+    Disturbance,
+    Push,
+    environment,
+    start_of,
+)
+from walking_irl.domains.humanoid.closed_loop.policy import tracking_policy
+from walking_irl.domains.humanoid.closed_loop.rollout import rollout
+from walking_irl.domains.humanoid.costs.objectives import REFERENCE_WEIGHTS, folded_costs
+from walking_irl.domains.humanoid.gait.library import load_gaits
+from walking_irl.errors import InvalidInputError
+
+
+@pytest.fixture(scope="module", params=[False, True], ids=["spatial", "planar"])
+def walking(request):
+    walker = load_walker(request.param)
+    gait = load_gaits(request.param)["reference"]
+    return walker, gait, tracking_policy(walker, gait)
+
+
+def make(walking, seed=0, **options):
+    walker, gait, _ = walking
+    return environment(walker, start_of(walker, gait), rng=np.random.default_rng(seed), **options)
+
+
+def walk(env, policy, n):
+    """Time steps of n steps under a policy."""
+    steps = [env.reset()]
+    data = env.physics.data.ptr
+    for k in range(n):
+        steps.append(env.step(policy.torque(k, data.qpos, data.qvel)))
+    return steps
+
+
+def test_specs_describe_what_is_exchanged(walking):
+    walker = walking[0]
+    env = make(walking, weights=REFERENCE_WEIGHTS)
+    spec = env.action_spec()
+    assert spec.shape == (walker.model.nu,)
+    np.testing.assert_allclose(spec.maximum, 1.5 * walker.strength_plus)
+    np.testing.assert_allclose(spec.minimum, -1.5 * walker.strength_minus)
+    first = env.reset()
+    described = env.observation_spec()
+    assert set(first.observation) == set(described)
+    for name, value in first.observation.items():
+        assert value.shape == described[name].shape, name
+
+
+def test_every_observation_and_every_feature_changes(walking):
+    env = make(walking, weights=REFERENCE_WEIGHTS)
+    steps, phi = [env.reset()], []
+    data = env.physics.data.ptr
+    for k in range(80):
+        steps.append(env.step(walking[2].torque(k, data.qpos, data.qvel)))
+        phi.append(env.task.phi)
+    for name in steps[0].observation:
+        seen = np.array([s.observation[name] for s in steps])
+        assert np.ptp(seen, axis=0).max() > 1e-3, name
+    assert (np.ptp(phi[1:], axis=0) > 1e-4).all()
+
+
+def test_mean_feature_over_a_cycle_is_mu(walking):
+    """Reward against objectives: the same numbers up to the speed's drift from the gait's."""
+    walker, _, policy = walking
+    env, K = make(walking, weights=REFERENCE_WEIGHTS), policy.steps_per_cycle
+    env.reset()
+    data, phi, rewards = env.physics.data.ptr, [], []
+    for k in range(2 * K + 1):
+        rewards.append(env.step(policy.torque(k, data.qpos, data.qvel)).reward)
+        phi.append(env.task.phi)
+    second = slice(K + 1, 2 * K + 1)  # the reward of a step comes one step later
+    recorded = rollout(walker, policy, cycles=2)
+    cycle = type(recorded)(*(part[K : 2 * K + 1] for part in vars(recorded).values()))
+    mu = -folded_costs(walker, cycle, policy.timestep)
+    np.testing.assert_allclose(np.mean(phi[second], 0), mu, rtol=1e-3)
+    assert np.mean(rewards[second]) == pytest.approx(REFERENCE_WEIGHTS @ mu, rel=1e-3)
+
+
+def test_recorded_steps_obey_the_inverse_dynamics(walking):
+    """Torque, acceleration and sensors of a sample belong to its state."""
+    import mujoco
+
+    walker, _, policy = walking
+    recorded = rollout(walker, policy, cycles=1)
+    data = mujoco.MjData(walker.model)
+    for k in range(5, 75, 10):
+        data.qpos[:], data.qvel[:] = recorded.q[k], recorded.v[k]
+        data.qacc[:] = recorded.a[k]
+        mujoco.mj_inverse(walker.model, data)
+        np.testing.assert_allclose(data.qfrc_inverse[walker.n_root :], recorded.u[k], atol=1e-3)
+        np.testing.assert_allclose(data.sensordata, recorded.sensors[k], atol=1e-2)
+
+
+def test_same_seed_same_walk_other_seed_other_walk(walking):
+    disturbed = Disturbance(velocity_noise=0.05, kicks=0.05)
+
+    def final(seed):
+        env = make(walking, seed, disturbance=disturbed)
+        walk(env, walking[2], 100)
+        return env.physics.data.ptr.qpos.copy()
+
+    np.testing.assert_array_equal(final(1), final(1))
+    assert np.abs(final(1) - final(2)).max() > 1e-4
+
+
+def test_kicks_come_once_in_every_cycle(walking):
+    walker, _, policy = walking
+    kicked = rollout(walker, policy, cycles=6, rng=np.random.default_rng(0), kicks=0.5)
+    jump = kicked.v[1:] - kicked.v[:-1] - policy.timestep * kicked.a[:-1]
+    at = np.flatnonzero(np.abs(jump).max(1) > 1e-6)
+    assert list(at // policy.steps_per_cycle) in ([0, 1, 2, 3, 4, 5], [0, 1, 2, 3, 4, 5, 6])
+    assert not np.abs(jump[:, : walker.n_root]).max() > 1e-6
+
+
+def test_push_acts_for_a_tenth_of_a_second(walking):
+    """An impulse of 100 N x .1 s changes the momentum of 72 kg by about .14 m/s."""
+    walker, _, policy = walking
+    calm = rollout(walker, policy, seconds=1.0)
+    pushed = rollout(walker, policy, seconds=1.0, push=Push(0.4, (100.0, 0.0, 0.0)))
+    before = pushed.time <= 0.4
+    np.testing.assert_array_equal(pushed.q[before], calm.q[before])
+    com = walker.sensor["com"].start
+    gained = np.gradient(pushed.sensors[:, com] - calm.sensors[:, com], policy.timestep)
+    at = np.searchsorted(pushed.time, 0.52)
+    assert 0.3 * 0.14 < gained[at] < 1.7 * 0.14
+
+
+def test_fall_ends_the_episode_with_discount_zero(walking):
+    env = make(walking)
+    env.reset()
+    for _ in range(1000):
+        step = env.step(np.zeros(walking[0].model.nu))
+        if step.last():
+            break
+    assert step.last() and step.discount == 0.0
+    height = env.physics.data.ptr.qpos[walking[0].joints.index("root_z")]
+    pitch = env.physics.data.ptr.qpos[walking[0].joints.index("root_pitch")]
+    assert height < -0.3 or abs(pitch) > 1.0
+
+
+def test_held_actions_take_several_steps(walking):
+    env = make(walking, steps_per_control=4, weights=REFERENCE_WEIGHTS)
+    env.reset()
+    env.step(np.zeros(walking[0].model.nu))
+    assert env.physics.time() == pytest.approx(4 * walking[2].timestep)
+    assert env.control_timestep() == pytest.approx(4 * walking[2].timestep)
+
+
+def test_time_limit_ends_the_episode_with_discount_one(walking):
+    n_steps = 10
+    env = make(walking, time_limit=(n_steps - 0.5) * walking[2].timestep)
+    steps = walk(env, walking[2], n_steps)
+    assert [s.last() for s in steps] == [False] * n_steps + [True]
+    assert steps[-1].discount == 1.0
+
+
+def test_nonsense_is_refused(walking):
+    with pytest.raises(InvalidInputError, match=r"weights must have shape \(6,\), got \(3,\)"):
+        make(walking, weights=np.ones(3))
+    with pytest.raises(InvalidInputError, match="steps_per_control must be 1 or more, got 0"):
+        make(walking, steps_per_control=0)
+    with pytest.raises(InvalidInputError, match="substeps must be 1 or more"):
+        start_of(walking[0], walking[1], substeps=0)

@@ -1,0 +1,106 @@
+"""``walking-irl gait``: the best gait under given weights, as figures, picture and files."""
+
+from __future__ import annotations
+
+import argparse
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from walking_irl.arrays import Array
+from walking_irl.cli.weights import parse_weights, show_weights
+from walking_irl.domains import load
+from walking_irl.errors import InvalidInputError
+from walking_irl.files import check_ending, check_outputs, write_file
+from walking_irl.run.report import write_json
+from walking_irl.run.session import workers
+
+
+def run(args: argparse.Namespace, console: Console) -> int:
+    """``walking-irl gait``."""
+    from walking_irl.domains.humanoid.domain import Humanoid
+    from walking_irl.domains.humanoid.gait.files import save_gait
+    from walking_irl.domains.humanoid.gait.realism import figures
+    from walking_irl.domains.humanoid.learner import check_weights
+
+    check_ending(args.save, ".npz", ".csv")
+    check_ending(args.record, ".rrd")
+    check_ending(args.png, ".png")
+    check_outputs([args.save, args.record, args.png, args.json])
+    if not (np.isfinite(args.seconds) and args.seconds > 0):
+        raise InvalidInputError(f"seconds must be a positive number, got {args.seconds}")
+    domain = load(args.domain)
+    if not isinstance(domain, Humanoid):
+        raise InvalidInputError(f"gait needs humanoid or humanoid-planar, got {args.domain!r}")
+    given = parse_weights(args.weights)
+    w = check_weights(np.array(given))
+    if not args.quiet:
+        show_weights(w, console)
+    with workers() as executor:
+        response = domain.forward(w, executor)
+    found = response.policy
+    content = {
+        "objectives": [o.name for o in domain.objectives],
+        "w": w.tolist(),
+        "mu": response.mu.tolist(),
+        **figures(domain.walker, found),
+        "solver": dict(response.info),
+    }
+    if args.save is not None:
+        save_gait(args.save, found, domain.walker)
+    if args.png is not None:
+        from walking_irl.domains.humanoid.gait.pictures import strip
+
+        write_file(args.png, png(strip(domain.walker, found)))
+    if args.record is not None:
+        _record_walk(args.record, domain, found, args.seconds, w)
+    if args.json is not None:
+        write_json(args.json, content)
+    if not args.quiet:
+        _show_gait(content, console)
+    return 0
+
+
+def png(picture: Any) -> bytes:
+    """A picture (height, width, 3) as the content of a PNG file."""
+    from PIL import Image
+
+    content = io.BytesIO()
+    Image.fromarray(picture).save(content, format="PNG", optimize=True)
+    return content.getvalue()
+
+
+def _record_walk(path: Path, domain: Any, found: Any, seconds: float, w: Array) -> None:
+    """Closed-loop walk of a gait at half the knot timestep, as a recording."""
+    from walking_irl.domains.humanoid.closed_loop.policy import tracking_policy
+    from walking_irl.domains.humanoid.closed_loop.rollout import rollout
+    from walking_irl.recording import record_motion
+    from walking_irl.recording.views.gait import WalkerView
+
+    policy = tracking_policy(domain.walker, found, substeps=2)
+    walked = rollout(domain.walker, policy, seconds=seconds)
+    rows = [f"| {o.name} | {v:.4f} |" for o, v in zip(domain.objectives, w, strict=True)]
+    text = "\n".join(["| objective | weight |", "|---|---|", *rows])
+    record_motion(path, WalkerView(domain.walker.model), walked, title=domain.name, text=text)
+
+
+def _show_gait(content: dict[str, Any], console: Console) -> None:
+    table = Table("figure", "value")
+    for name, unit in (
+        ("speed", "m/s"),
+        ("step_length", "m"),
+        ("cadence", "steps/min"),
+        ("stance_fraction", "of the cycle"),
+        ("cost_of_transport", "mechanical"),
+        ("peak_vertical_force", "body weights"),
+        ("max_root_residual", "body weights"),
+        ("realism", "of 1"),
+    ):
+        table.add_row(name.replace("_", " "), f"{content[name]:.4g} {unit}")
+    for name, value in zip(content["objectives"], content["mu"], strict=True):
+        table.add_row(f"mu {name}", f"{value:.5f}")
+    console.print(table)

@@ -1,0 +1,62 @@
+"""``walking-irl inspect``: what a recording holds."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from walking_irl.cpirl.summary import per_unit
+from walking_irl.files import check_outputs
+from walking_irl.run.report import write_json
+
+
+def run(args: argparse.Namespace, console: Console) -> int:
+    """``walking-irl inspect``."""
+    from walking_irl.recording.reader import inspect_recording
+
+    check_outputs([args.json], inputs=[args.file])
+    content = inspect_recording(args.file)
+    if args.json is not None:
+        write_json(args.json, content)
+    console.print(_table_of_recording(content))
+    for key in (
+        *("domain", "seed", "centre", "mode", "status", "ending", "rule", "certificate"),
+        *("bracket", "volume_ratio", "condition_number", "weakest", "gauge", "noise"),
+    ):
+        if content[key] is not None:
+            console.print(f"{key.replace('_', ' ')}: {escape(_short(content[key]))}")
+    console.print(f"iterations: {content['iterations']}, frames: {content['frames']}")
+    console.print(f"timelines: {', '.join(content['timelines'])}")
+    console.print(f"{len(content['entities'])} entities:")
+    for entity in content["entities"]:
+        console.print(f"  {escape(entity)}")
+    return 0
+
+
+def _table_of_recording(content: dict[str, Any]) -> Table:
+    table = Table("objective", "hidden", "recovered", "interval", "per raw unit")
+    hidden, found, bounds = content["w_expert"], content["w"], content["intervals"]
+    for j, name in enumerate(content["objectives"] or []):
+        table.add_row(
+            str(name),
+            "unknown" if hidden is None else f"{hidden[j]:.4f}",
+            "-" if found is None else f"{found[j]:.4f}",
+            "-" if bounds is None else f"{bounds[j][0]:.4f} .. {bounds[j][1]:.4f}",
+            "-"
+            if content["physical_intervals"] is None
+            else per_unit(content["physical_intervals"][j], content["units"][j]).replace(
+                " per ", "\nper "
+            ),
+        )
+    return table
+
+
+def _short(value: Any) -> str:
+    """A value of a recording, with few digits."""
+    if isinstance(value, list):
+        return ", ".join(_short(v) for v in value)
+    return f"{value:.3g}" if isinstance(value, float) else str(value)

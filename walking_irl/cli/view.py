@@ -1,0 +1,35 @@
+"""``walking-irl view``: a recording in the viewer, or as a picture where there is no screen."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+
+from rich.console import Console
+from rich.markup import escape
+
+from walking_irl.errors import InvalidInputError
+from walking_irl.files import check_ending, check_outputs
+
+SCREENS = ("DISPLAY", "WAYLAND_DISPLAY")
+
+
+def run(args: argparse.Namespace, console: Console) -> int:
+    """``walking-irl view``."""
+    from walking_irl.recording.screenshot import open_viewer, save_screenshot
+
+    if args.png is None:
+        if sys.platform.startswith("linux") and not any(map(os.environ.get, SCREENS)):
+            raise InvalidInputError(
+                "there is no screen for the viewer; render a picture with --png FILE.png, or copy "
+                "the file to a machine with a screen"
+            )
+        open_viewer(args.file)
+        console.print("the viewer is opening; move the frame slider to play")
+    else:
+        check_ending(args.png, ".png")
+        check_outputs([args.png], inputs=[args.file])
+        save_screenshot(args.file, args.png, frame=args.frame)
+        console.print(f"wrote {escape(str(args.png))}")
+    return 0

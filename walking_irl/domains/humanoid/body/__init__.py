@@ -1,0 +1,1 @@
+"""The walker's body: what MuJoCo's model says of it."""

@@ -1,0 +1,1 @@
+"""The gait in forward dynamics: controller, environment, rollouts."""

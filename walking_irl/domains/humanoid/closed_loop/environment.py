@@ -1,0 +1,312 @@
+"""The walker as a dm_control environment: torques in, observations and w.phi out.
+
+Y. Tassa et al. (2020), dm_control: Software and tasks for continuous control. A step of the
+environment holds the torques; its cost is known one step later, when the ground force at its end
+is, so the reward of a step belongs to the step before it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from dm_control.rl import control
+from dm_env import specs
+
+from walking_irl.arrays import Array, Indices
+from walking_irl.domains.humanoid.body.anatomy import Walker
+from walking_irl.domains.humanoid.body.physics import WalkerPhysics
+from walking_irl.domains.humanoid.costs.objectives import (
+    OBJECTIVES,
+    REFERENCE_SPEED,
+    Motion,
+    costs,
+    fixed_cost,
+    layout,
+    residuals,
+)
+from walking_irl.domains.humanoid.gait.gait import Gait, cycle_motion
+from walking_irl.errors import InvalidInputError
+
+FALL_DROP = 0.3  # of the pelvis below upright standing [m]
+FALL_PITCH = 1.0  # of the pelvis [rad]
+PUSH_DURATION = 0.1  # [s]
+
+
+class Start(NamedTuple):
+    """Where a walk begins, and the gait that it follows.
+
+    ``q`` [m, rad] and ``v`` [m/s, rad/s] have shape (nv,); ``timestep`` [s] is the simulation's,
+    ``period`` [s] the duration of a gait cycle, ``speed`` [m/s] the gait's.
+    """
+
+    q: Array
+    v: Array
+    timestep: float
+    period: float
+    speed: float
+
+
+class Push(NamedTuple):
+    """A force on the pelvis from ``time`` [s] on, for PUSH_DURATION; (x, y, z) [N]."""
+
+    time: float
+    force: tuple[float, float, float]
+
+
+class Step(NamedTuple):
+    """One step of a walk: state and sensors at its start, torque and acceleration during it."""
+
+    q: Array
+    v: Array
+    a: Array
+    u: Array
+    sensors: Array
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """What keeps a walk from repeating itself.
+
+    Attributes:
+        velocity_noise: Standard deviation of the joints' velocities at the start [rad/s].
+        kicks: The same of changes of velocity at one random step of every gait cycle [rad/s].
+        push: A push against the pelvis.
+    """
+
+    velocity_noise: float = 0.0
+    kicks: float = 0.0
+    push: Push | None = None
+
+
+class _Simulation(WalkerPhysics):
+    """The same simulation, whose steps check for trouble in a fifth of the time."""
+
+    def step(self, nstep: int = 1) -> None:
+        """Advance by ``nstep`` steps; raises PhysicsError where the state is no longer valid."""
+        if not self.legacy_step:
+            super().step(nstep)
+            return
+        model, data = self.model.ptr, self.data.ptr
+        warnings, before = self._warnings, self._warnings.tolist()
+        mujoco.mj_step2(model, data)
+        if nstep > 1:
+            mujoco.mj_step(model, data, nstep - 1)
+        mujoco.mj_step1(model, data)
+        after = warnings.tolist()
+        if after != before:  # let dm_control say what it is
+            warnings[:] = before
+            with self.check_invalid_state():
+                warnings[:] = after
+
+
+class Walk(control.Task):  # type: ignore[misc]
+    """Walk along a gait's phase without falling, for the reward w.phi.
+
+    Attributes:
+        phi: Feature vector of the last complete step, shape (K,): its mean over a whole cycle at
+            the gait's speed is mu.
+        last: The last step, recorded.
+        n_steps: Steps since the start of the episode.
+    """
+
+    def __init__(
+        self,
+        walker: Walker,
+        start: Start,
+        *,
+        random: np.random.RandomState,
+        weights: Array | None = None,
+        steps_per_control: int = 1,
+        disturbance: Disturbance | None = None,
+    ) -> None:
+        """Set up the task; ``weights`` (K,) default to none, which saves the reward's work."""
+        if weights is not None and np.shape(weights) != (len(OBJECTIVES),):
+            raise InvalidInputError(
+                f"weights must have shape ({len(OBJECTIVES)},), got {np.shape(weights)}"
+            )
+        self.walker, self.start, self.random = walker, start, random
+        self.weights = weights
+        self.disturbance = disturbance or Disturbance()
+        self.control_timestep = start.timestep * steps_per_control
+        self.steps_per_cycle = round(start.period / self.control_timestep)
+        self.phi = np.zeros(len(OBJECTIVES))
+        self.last: Step | None = None
+        self.n_steps = 0
+        self._steps_per_control = steps_per_control
+        self._layout = layout(walker)
+        stage = np.repeat(walker.model.sensor_needstage, walker.model.sensor_dim)
+        self._late = _runs(np.flatnonzero(stage == mujoco.mjtStage.mjSTAGE_ACC))
+        self._unit = np.ones(walker.model.nsensordata)  # of the sensors as they are observed
+        self._unit[self._layout.touch] = walker.weight
+        (self._touch,) = _runs(self._layout.touch)
+        angle = 2 * math.pi / self.steps_per_cycle * np.arange(self.steps_per_cycle)
+        self._phases = np.column_stack([np.cos(angle), np.sin(angle)])
+        self._height = walker.joints.index("root_z")
+        self._pitch = walker.joints.index("root_pitch")
+        self._pelvis = walker.model.body("pelvis").id
+        self._kick_at = -1
+        self._pushing = False
+
+    def initialize_episode(self, physics: WalkerPhysics) -> None:
+        """Put the walker at the start of the gait."""
+        data = physics.data
+        data.qpos[:], data.qvel[:] = self.start.q, self.start.v
+        if self.disturbance.velocity_noise > 0:
+            self._kick(data, self.disturbance.velocity_noise)
+        self.n_steps, self.last, self._pushing = 0, None, False
+        self.phi = np.zeros(len(OBJECTIVES))
+        self._kick_at = self.random.randint(self.steps_per_cycle)
+
+    def before_step(self, action: Array, physics: WalkerPhysics) -> None:
+        """Set the torques and note the state; a push acts here."""
+        data = physics.data.ptr
+        data.ctrl[:] = action
+        if self.disturbance.push is not None:
+            self._push(data, self.disturbance.push)
+        if self._steps_per_control > 1:  # else force sensors would be those of the last substep
+            mujoco.mj_forward(physics.model.ptr, data)
+        self._state = data.qpos.copy(), data.qvel.copy(), data.sensordata.copy()
+
+    def after_step(self, physics: WalkerPhysics) -> None:
+        """Record the step, compute the features of the one before, and kick for the next."""
+        data = physics.data.ptr
+        q, v, sensors = self._state
+        if self._steps_per_control == 1:  # force and acceleration are known only now
+            now = data.sensordata
+            for late in self._late:
+                sensors[late] = now[late]
+        a = (data.qvel - v) / self.control_timestep
+        step = Step(q, v, a, data.actuator_force.copy(), sensors)
+        if self.weights is not None and self.last is not None:
+            self.phi = self._features(self.last, step)
+        self.last = step
+        self.n_steps += 1
+        if self.disturbance.kicks > 0:
+            if self.n_steps % self.steps_per_cycle == self._kick_at:
+                self._kick(data, self.disturbance.kicks)
+                mujoco.mj_step1(physics.model.ptr, data)
+            if self.n_steps % self.steps_per_cycle == 0:
+                self._kick_at = self.random.randint(self.steps_per_cycle)
+
+    def get_reward(self, physics: WalkerPhysics) -> float:
+        """w.phi of the last complete step."""
+        return 0.0 if self.weights is None else float(self.weights @ self.phi)
+
+    def get_termination(self, physics: WalkerPhysics) -> float | None:
+        """Ends the episode with discount 0 on a fall."""
+        return 0.0 if self.has_fallen(physics) else None
+
+    def has_fallen(self, physics: WalkerPhysics) -> bool:
+        """Whether the pelvis is too low or too far tilted, or the state is not finite."""
+        q = physics.data.ptr.qpos.tolist()
+        upright = q[self._height] > -FALL_DROP and abs(q[self._pitch]) < FALL_PITCH
+        return not (upright and math.isfinite(sum(q)))
+
+    def get_observation(self, physics: WalkerPhysics) -> dict[str, Array]:
+        """What a controller may see; everything but the position on the ground."""
+        data, sensor = physics.data.ptr, self.walker.sensor
+        sensors = data.sensordata / self._unit
+        q = data.qpos.copy()
+        com = sensors[sensor["com"]]
+        com[0] -= q[0]
+        return {
+            "joint_positions": q[1:],
+            "joint_velocities": data.qvel.copy(),
+            "phase": self._phases[self.n_steps % self.steps_per_cycle].copy(),
+            "centre_of_mass": com,
+            "contact_forces": sensors[self._touch],
+            "trunk_axis": sensors[sensor["trunk_axis"]],
+            "trunk_velocity": sensors[sensor["trunk_velocity"]],
+            "angular_momentum": sensors[sensor["angular_momentum"]],
+        }
+
+    def action_spec(self, physics: WalkerPhysics) -> specs.BoundedArray:
+        """Torques of the joints [Nm]."""
+        lower, upper = self.walker.model.actuator_ctrlrange.T
+        joints = self.walker.joints[self.walker.n_root :]
+        return specs.BoundedArray((len(joints),), float, lower, upper, name="\t".join(joints))
+
+    def _features(self, step: Step, after: Step) -> Array:
+        motion = Motion(
+            q=step.q[None],
+            v=step.v[None],
+            v_next=after.v[None],
+            a=step.a[None],
+            tau=step.u[None],
+            s=step.sensors[None],
+            s_next=after.sensors[None],
+            h=self.control_timestep,
+            distance=self.start.speed * self.control_timestep,
+        )
+        r = residuals(self.walker, self._layout, motion)
+        cost = costs(r, motion.pace) + fixed_cost(r)
+        # Seconds per metre, linearised at the gait's speed: the reward must feel a faster step.
+        slow = 1 - (after.q[0] - step.q[0]) / motion.distance
+        cost[_TIME] += slow * REFERENCE_SPEED / self.start.speed / OBJECTIVES[_TIME].scale
+        return -cost
+
+    def _push(self, data: mujoco.MjData, push: Push) -> None:
+        active = push.time <= data.time < push.time + PUSH_DURATION
+        if active or self._pushing:
+            data.xfrc_applied[self._pelvis, :3] = push.force if active else 0
+        self._pushing = active
+
+    def _kick(self, data: mujoco.MjData, deviation: float) -> None:
+        n = self.walker.n_root
+        data.qvel[n:] += deviation * self.random.normal(size=len(self.walker.joints) - n)
+
+
+_TIME = [o.name for o in OBJECTIVES].index("time")
+
+
+def _runs(indices: Indices) -> list[slice]:
+    """Increasing indices as slices, which NumPy reads faster."""
+    parts = np.split(indices, np.flatnonzero(np.diff(indices) != 1) + 1)
+    return [slice(int(part[0]), int(part[-1]) + 1) for part in parts]
+
+
+def start_of(walker: Walker, gait: Gait, *, substeps: int = 1) -> Start:
+    """The first knot of a gait; ``substeps`` simulation steps per knot."""
+    if substeps < 1:
+        raise InvalidInputError(f"substeps must be 1 or more, got {substeps}")
+    q, v, _ = cycle_motion(gait, walker.mirror)
+    return Start(q[0], v[0], gait.timestep / substeps, 2 * gait.half_period, gait.speed)
+
+
+def environment(
+    walker: Walker,
+    start: Start,
+    *,
+    rng: np.random.Generator,
+    weights: Array | None = None,
+    steps_per_control: int = 1,
+    time_limit: float = float("inf"),
+    disturbance: Disturbance | None = None,
+) -> control.Environment:
+    """A dm_control environment in which the walker walks.
+
+    Args:
+        walker: Who walks.
+        start: Where the walk begins and how fine the simulation is; see :func:`start_of`.
+        rng: Source of the disturbances.
+        weights: Of the reward, shape (K,); without them the reward is zero.
+        steps_per_control: Simulation steps for which an action is held.
+        time_limit: End of an episode [s].
+        disturbance: Noise, kicks and pushes.
+    """
+    if steps_per_control < 1:
+        raise InvalidInputError(f"steps_per_control must be 1 or more, got {steps_per_control}")
+    task = Walk(
+        walker,
+        start,
+        random=np.random.RandomState(rng.bit_generator),
+        weights=weights,
+        steps_per_control=steps_per_control,
+        disturbance=disturbance,
+    )
+    physics = _Simulation.of(walker, start.timestep)
+    return control.Environment(physics, task, time_limit=time_limit, n_sub_steps=steps_per_control)

@@ -1,0 +1,161 @@
+"""Walks of a policy in the environment, recorded, and the gait that they show on average."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from dm_control.rl.control import Environment, PhysicsError
+
+from walking_irl.arrays import Array
+from walking_irl.domains.humanoid.body.anatomy import Walker
+from walking_irl.domains.humanoid.closed_loop.environment import (
+    Disturbance,
+    Push,
+    Start,
+    Step,
+    environment,
+)
+from walking_irl.domains.humanoid.closed_loop.policy import TrackingPolicy
+from walking_irl.domains.humanoid.gait.gait import Gait
+from walking_irl.errors import FallError, InvalidInputError
+from walking_irl.types import Rollout
+
+
+def rollout(
+    walker: Walker,
+    policy: TrackingPolicy,
+    *,
+    cycles: int | None = None,
+    seconds: float | None = None,
+    rng: np.random.Generator | None = None,
+    velocity_noise: float = 0.0,
+    kicks: float = 0.0,
+    push: Push | None = None,
+    raise_on_fall: bool = True,
+) -> Rollout:
+    """Walk from the gait's first knot, and record every step.
+
+    Args:
+        walker: Who walks.
+        policy: The controller.
+        cycles: Gait cycles to walk; either this or ``seconds``.
+        seconds: Time to walk [s].
+        rng: Source of noise and kicks; needed for those only.
+        velocity_noise: Standard deviation of the joints' velocities at the start [rad/s].
+        kicks: The same of changes at a random step of every cycle [rad/s].
+        push: A push against the pelvis.
+        raise_on_fall: Whether a fall is an error, or just ends the recording.
+
+    Returns:
+        The walk, with one sample more than steps asked for: it closes the last step.
+
+    Raises:
+        FallError: If the walker falls.
+        InvalidInputError: If the arguments contradict each other.
+    """
+    n_samples = 1 + _n_steps(policy, cycles, seconds)
+    if rng is None and (velocity_noise > 0 or kicks > 0):
+        raise InvalidInputError("noise and kicks need a random generator: give rng")
+    reference = policy.reference
+    env = environment(
+        walker,
+        Start(
+            reference.q[0],
+            reference.v[0],
+            policy.timestep,
+            policy.period,
+            policy.stride / policy.period,
+        ),
+        rng=rng or np.random.default_rng(0),
+        disturbance=Disturbance(velocity_noise, kicks, push),
+    )
+    steps, fell = _walk(env, policy, n_samples)
+    if fell and raise_on_fall:
+        raise _fall(walker, env, len(steps) * policy.timestep)
+    parts = zip(*steps, strict=True)
+    q, v, a, u, sensors = (np.concatenate(part).reshape(len(steps), -1) for part in parts)
+    return Rollout(policy.timestep * np.arange(len(steps), dtype=float), q, v, a, u, sensors)
+
+
+def averaged_gait(
+    walker: Walker,
+    rollouts: Sequence[Rollout],
+    policy: TrackingPolicy,
+    *,
+    skip: int = 2,
+    substeps: int = 1,
+) -> Gait:
+    r"""Mean gait of recorded walks: over cycles, and over the gait and its mirror image.
+
+    .. math:: \bar q_i = \tfrac12 (\hat q_i + S (\hat q_{i+N} - \bar L e_x)), \quad i < N
+
+    Args:
+        walker: Who walked.
+        rollouts: Walks of ``policy``, whole from the first step.
+        policy: Whose clock divides the walks into cycles.
+        skip: First cycles of every walk that are left out, until it has settled.
+        substeps: Every so many steps of the simulation is a knot of the gait.
+
+    Raises:
+        InvalidInputError: If no whole cycle remains, or cycles do not divide into knots.
+    """
+    K = policy.steps_per_cycle
+    if K % (2 * substeps):
+        raise InvalidInputError(f"{K} steps a cycle do not divide by 2 x {substeps} substeps")
+    pieces, strides = [], []
+    for walk in rollouts:
+        for c in range(skip, (len(walk.q) - 1) // K):
+            piece = walk.q[c * K : (c + 1) * K : substeps].copy()
+            piece[:, 0] -= piece[:, 0].mean()
+            pieces.append(piece)
+            strides.append(walk.q[(c + 1) * K, 0] - walk.q[c * K, 0])
+    if not pieces:
+        raise InvalidInputError(f"no walk has more than {skip} whole gait cycles")
+    return _symmetric(walker, np.mean(pieces, 0), float(np.mean(strides)) / 2, policy.period / 2)
+
+
+def _symmetric(walker: Walker, q: Array, step_length: float, half_period: float) -> Gait:
+    """Mean of a whole cycle (2 N, nv) and its mirror image, from x = 0 on."""
+    n = len(q) // 2
+    second = q[n:].copy()
+    second[:, 0] -= step_length
+    half = (q[:n] + second @ walker.mirror.T) / 2
+    half[:, 0] -= half[0, 0]
+    return Gait(half, step_length, half_period)
+
+
+def _n_steps(policy: TrackingPolicy, cycles: int | None, seconds: float | None) -> int:
+    if (cycles is None) == (seconds is None):
+        raise InvalidInputError("give either cycles or seconds")
+    n = cycles * policy.steps_per_cycle if cycles else round((seconds or 0) / policy.timestep)
+    if n < 1:
+        raise InvalidInputError(f"a walk needs at least one step, got {cycles or seconds}")
+    return n
+
+
+def _walk(env: Environment, policy: TrackingPolicy, n_samples: int) -> tuple[list[Step], bool]:
+    """Steps walked, and whether the walker fell."""
+    steps: list[Step] = []
+    env.reset()
+    data, task = env.physics.data.ptr, env.task
+    q, v = data.qpos, data.qvel
+    for k in range(n_samples):
+        try:
+            ends = env.step(policy.torque(k, q, v)).last()
+        except PhysicsError:
+            return steps, True
+        steps.append(task.last)
+        if ends:
+            return steps, True
+    return steps, False
+
+
+def _fall(walker: Walker, env: Environment, time: float) -> FallError:
+    q = env.physics.data.ptr.qpos
+    height, pitch = (q[walker.joints.index(j)] for j in ("root_z", "root_pitch"))
+    return FallError(
+        f"the walker fell after {time:.2f} s: pelvis {100 * -height:.0f} cm below standing, "
+        f"pitched by {np.degrees(pitch):.0f} degrees",
+        time,
+    )

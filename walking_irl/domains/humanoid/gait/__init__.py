@@ -1,0 +1,1 @@
+"""Gaits: periodic motions, their files, figures and pictures."""

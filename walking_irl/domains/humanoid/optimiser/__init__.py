@@ -1,0 +1,1 @@
+"""The best gait under given weights, by inverse dynamics."""

@@ -1,0 +1,199 @@
+r"""The optimal gait as a sparse least-squares problem, through MuJoCo's inverse dynamics.
+
+Unknowns are the knots of half a cycle, the step length and the half period (:class:`~.gait.Gait`).
+Inverse dynamics turns them into joint torques, sensor readings and the forces that would have to
+act on the unactuated root; those are penalised away:
+
+.. math:: \min_x \; w \cdot G(x), \qquad G_j = F_j/\text{scale}_j + C + \rho \, |f_\text{root}|^2
+
+T. Erez, E. Todorov (2012), Trajectory optimization for domains with contacts using inverse
+dynamics. The derivatives of inverse dynamics are MuJoCo's (``mjd_inverseFD``); everything else is
+chained by hand onto windows of four knots (:mod:`~.normal_equations`).
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+
+from walking_irl.arrays import Array
+from walking_irl.domains.humanoid.body.anatomy import Walker
+from walking_irl.domains.humanoid.costs.objectives import (
+    UNIT,
+    Layout,
+    Motion,
+    Residuals,
+    costs,
+    fixed_cost,
+    layout,
+    mean_square,
+    residuals,
+)
+from walking_irl.domains.humanoid.gait.gait import Gait
+
+ROOT_PENALTY = 1e6 / UNIT
+"""rho; leaves root forces of about 1e-5 body weights, so that the gait can be simulated."""
+GAUGE_WEIGHT = 100.0 / UNIT  # of: starts at x = 0, feet side by side at mid-step [1/m^2]
+PERIOD_WEIGHT = 900.0 / UNIT  # of the squared excess of the half period [1/s^2]
+PERIOD_RANGE = (0.35, 1.0)  # of the half period [s]
+
+
+class Evaluation(NamedTuple):
+    """A gait with everything that its costs need."""
+
+    x: Array
+    motion: Motion
+    residuals: Residuals
+    root: Array
+    """Root forces over body weight, moments over half a body weight times a metre, (N, n_root)."""
+    gauge: Array
+    """Start position [m], feet at mid-step [m], excess half period [s]; shape (3,)."""
+    objective_costs: Array
+    """Scaled costs F_j / scale_j, shape (6,)."""
+    shared: float
+    """Fixed part without the root penalty."""
+    root_square: float
+
+    def folded(self) -> Array:
+        """Folded costs G at full root penalty, shape (6,)."""
+        return self.objective_costs + self.shared + ROOT_PENALTY * self.root_square
+
+    def total(self, w: Array, penalty: float) -> float:
+        """What the solver minimises at weights ``w`` and a given root penalty."""
+        return float(w @ self.objective_costs + self.shared + penalty * self.root_square)
+
+
+class Derivatives(NamedTuple):
+    """Derivatives of inverse dynamics at every knot, input first.
+
+    ``force_*`` has shape (N, nv, nv), ``sensor_*`` (N, nv, ns); the suffix names the input.
+    """
+
+    force_q: Array
+    force_v: Array
+    force_a: Array
+    sensor_q: Array
+    sensor_v: Array
+    sensor_a: Array
+
+
+class Transcription:
+    """Evaluates gaits of a walker and the derivatives of its inverse dynamics.
+
+    Args:
+        walker: Who walks.
+        n_knots: Knots N of half a cycle.
+        threads: Threads over which the knots are divided; each has an ``MjData`` of its own.
+    """
+
+    def __init__(self, walker: Walker, n_knots: int = 40, threads: int = 1) -> None:
+        self.walker = walker
+        self.n_knots = n_knots
+        self.threads = threads
+        self.at: Layout = layout(walker)
+        self.nv = len(walker.joints)
+        self.size = n_knots * self.nv + 2
+        weight = walker.weight
+        self.root_unit = (
+            np.array([weight, weight, 0.5 * weight])
+            if walker.n_root == 3
+            else np.repeat([weight, 0.5 * weight], 3)
+        )
+        self.feet = np.array([walker.sensor[f"ankle_{s}"].start for s in "lr"])
+        self._pool: ThreadPoolExecutor | None = None
+        self._data: list[Any] = []
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but the scratch space of this process."""
+        return {**self.__dict__, "_pool": None, "_data": []}
+
+    def motion(self, x: Array) -> tuple[Array, Array, Array, Gait]:
+        """Positions of the N knots, velocities of N + 1 and accelerations of N knots."""
+        gait = Gait(x[:-2].reshape(self.n_knots, self.nv), float(x[-2]), float(x[-1]))
+        mirror = self.walker.mirror
+        before, after = mirror @ gait.q[-1], mirror @ gait.q[0]
+        before[0] -= gait.step_length
+        after[0] += gait.step_length
+        v = np.diff(np.vstack([before, gait.q, after]), axis=0) / gait.timestep
+        return gait.q, v, np.diff(v, axis=0) / gait.timestep, gait
+
+    def evaluate(self, x: Array) -> Evaluation:
+        """Costs of the gait ``x``."""
+        return self._evaluate(x, None)[0]
+
+    def differentiate(self, x: Array, eps: float) -> tuple[Evaluation, Derivatives]:
+        """Costs of the gait ``x`` and finite differences of inverse dynamics with step ``eps``."""
+        evaluation, derivatives = self._evaluate(x, eps)
+        assert derivatives is not None
+        return evaluation, derivatives
+
+    def _evaluate(self, x: Array, eps: float | None) -> tuple[Evaluation, Derivatives | None]:
+        q, v, a, gait = self.motion(x)
+        n, nv, ns = self.n_knots, self.nv, self.walker.model.nsensordata
+        force, sensor = np.empty((n, nv)), np.empty((n, ns))
+        d = None
+        if eps is not None:
+            shapes = [(n, nv, nv)] * 3 + [(n, nv, ns)] * 3
+            d = Derivatives(*(np.empty(shape) for shape in shapes))
+
+        def work(knots: range, data: Any) -> None:
+            model = self.walker.model
+            for i in knots:
+                data.qpos[:], data.qvel[:], data.qacc[:] = q[i], v[i], a[i]
+                mujoco.mj_inverse(model, data)
+                force[i], sensor[i] = data.qfrc_inverse, data.sensordata
+                if d is not None:
+                    mujoco.mjd_inverseFD(model, data, eps, False, *(field[i] for field in d), None)
+
+        self._over_knots(work)
+        return self._assemble(x, q, v, a, gait, force, sensor), d
+
+    def _over_knots(self, work: Any) -> None:
+        if not self._data:
+            self._data = [mujoco.MjData(self.walker.model) for _ in range(self.threads)]
+        if self.threads == 1:
+            work(range(self.n_knots), self._data[0])
+            return
+        if self._pool is None:
+            self._pool = ThreadPoolExecutor(self.threads)
+        edges = np.linspace(0, self.n_knots, self.threads + 1).astype(int)
+        parts = [range(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+        list(self._pool.map(work, parts, self._data))
+
+    def _assemble(
+        self,
+        x: Array,
+        q: Array,
+        v: Array,
+        a: Array,
+        gait: Gait,
+        force: Array,
+        sensor: Array,
+    ) -> Evaluation:
+        walker = self.walker
+        last = walker.sensor_mirror @ sensor[0] + walker.sensor_advance * gait.step_length
+        motion = Motion(
+            q=q,
+            v=v[:-1],
+            v_next=v[1:],
+            a=a,
+            tau=force[:, walker.n_root :],
+            s=sensor,
+            s_next=np.vstack([sensor[1:], last]),
+            h=gait.timestep,
+            distance=gait.step_length,
+        )
+        r = residuals(walker, self.at, motion)
+        root = force[:, : walker.n_root] / self.root_unit
+        left, right = sensor[self.n_knots // 2, self.feet]
+        low, high = PERIOD_RANGE
+        period = gait.half_period
+        gauge = np.array([q[0, 0], left - right, min(0, period - low) + max(0, period - high)])
+        weights = [GAUGE_WEIGHT, GAUGE_WEIGHT, PERIOD_WEIGHT]
+        shared = fixed_cost(r) + float(weights @ gauge**2)
+        return Evaluation(
+            x, motion, r, root, gauge, costs(r, motion.pace), shared, mean_square(root)
+        )

@@ -1,0 +1,1 @@
+"""Walking paths seen from above, by optimal control."""

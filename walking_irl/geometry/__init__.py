@@ -1,0 +1,1 @@
+"""The set of weights: its polyhedron, centres, and the linear programs underneath."""

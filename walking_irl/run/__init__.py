@@ -1,0 +1,1 @@
+"""One recovery, from what was asked to what was found."""

@@ -1,0 +1,94 @@
+"""The humanoid's side of a session: experts, demonstrations from files, what a recording shows."""
+
+from __future__ import annotations
+
+from concurrent.futures import Executor
+from pathlib import Path
+
+import numpy as np
+
+from walking_irl.domains.humanoid.closed_loop.trials import Protocol
+from walking_irl.domains.humanoid.domain import Humanoid, exact_expert
+from walking_irl.domains.humanoid.gait.files import load_gait
+from walking_irl.domains.humanoid.gait.gait import Gait, cycle_motion
+from walking_irl.domains.humanoid.learner import check_weights, solver_for
+from walking_irl.domains.humanoid.population import POPULATIONS
+from walking_irl.errors import InvalidInputError
+from walking_irl.run.case import Case, Setup, Subject
+from walking_irl.types import Rollout
+
+THREADS = 2
+"""Threads of one learner's solve: solves follow one another, so the cores would idle."""
+MIN_WEIGHT = 0.005
+"""The learner's lower bound of every weight; the gait of a vanishing weight is ill-defined."""
+PHYSICAL = 0.05
+"""Largest root force of a demonstration [body weights]: more is not this body's walk."""
+
+
+def humanoid_subject(domain: Humanoid, setup: Setup, executor: Executor | None) -> Subject:
+    """The expert that a setup asks for."""
+    if setup.demonstration is not None:
+        gait = load_gait(setup.demonstration, domain.walker)
+        return Subject(exact_expert(gait, _folded(domain, gait, setup.demonstration)), gait)
+    rng = np.random.default_rng(setup.seed)
+    if setup.population not in POPULATIONS:
+        choices = ", ".join(POPULATIONS)
+        raise InvalidInputError(f"unknown population {setup.population!r}; choose from {choices}")
+    w_E = POPULATIONS[setup.population](rng)
+    if setup.weights is not None:
+        w_E = check_weights(np.asarray(setup.weights))
+    if setup.expert == "suboptimal":
+        made = domain.demonstrate_poorly(w_E, rng, executor)
+        return Subject(made.expert, made.gait, w_E, made.expert.mu)
+    made = domain.demonstrate(w_E, rng, _protocol(setup), executor)
+    return Subject(made.expert, made.gait, w_E, -made.optimum.folded, made.rollouts)
+
+
+def humanoid_case(
+    domain: Humanoid, setup: Setup, subject: Subject, executor: Executor | None
+) -> Case:
+    """The learner's tools for an expert that is known."""
+    case = Case(
+        domain,
+        subject,
+        domain.learner(subject.expert, THREADS),
+        measure=domain.remeasure(_protocol(setup), setup.seed, executor),
+        min_weight=MIN_WEIGHT,
+    )
+    case.watch = lambda f: setattr(solver_for(domain.planar, THREADS), "watch", f)
+    if setup.record is not None:
+        from walking_irl.recording.views.gait import WalkerView
+
+        case.world = WalkerView(domain.walker.model, one_cycle(domain, subject.policy))
+        case.motion = lambda policy, w: one_cycle(domain, policy)
+    return case
+
+
+def _protocol(setup: Setup) -> Protocol:
+    """How the expert is recorded; a demonstration and a spoilt walk are known exactly."""
+    is_exact = setup.expert == "suboptimal" or setup.demonstration is not None
+    return Protocol(0 if is_exact else setup.rollouts, setup.noise, setup.disturbance)
+
+
+def one_cycle(domain: Humanoid, gait: Gait) -> Rollout:
+    """A gait's whole cycle, ready to be shown."""
+    from walking_irl.recording.views.motion import periodic_rollout
+
+    q, v, a = cycle_motion(gait, domain.walker.mirror)
+    return periodic_rollout(q, v, a, gait.timestep, 2 * gait.step_length)
+
+
+def _folded(domain: Humanoid, gait: Gait, path: Path) -> np.ndarray:
+    """Folded costs of a demonstrated gait.
+
+    Raises:
+        InvalidInputError: If it is not a walk that this body can do.
+    """
+    evaluation = solver_for(domain.planar).problem.evaluate(gait.to_vector())
+    worst = float(np.abs(evaluation.root).max())
+    if not worst < PHYSICAL:
+        raise InvalidInputError(
+            f"{path} is not a walk of this body: its root would need {worst:.2g} body weights of "
+            f"external force (at most {PHYSICAL}); give a gait saved by walking-irl gait --save"
+        )
+    return evaluation.folded()
