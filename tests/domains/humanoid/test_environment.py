@@ -68,7 +68,7 @@ def test_every_observation_and_every_feature_changes(walking):
 def test_mean_feature_over_a_cycle_is_mu(walking):
     """Reward against objectives: the same numbers up to the speed's drift from the gait's."""
     walker, _, policy = walking
-    env, K = make(walking, weights=REFERENCE_WEIGHTS), policy.steps_per_cycle
+    env, K = make(walking, weights=REFERENCE_WEIGHTS, price=0.0), policy.steps_per_cycle
     env.reset()
     data, phi, rewards = env.physics.data.ptr, [], []
     for k in range(2 * K + 1):

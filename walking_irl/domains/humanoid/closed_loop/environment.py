@@ -1,8 +1,9 @@
-"""The walker as a dm_control environment: torques in, observations and w.phi out.
+"""The walker as a dm_control environment: torques in, observations and a reward out.
 
 Y. Tassa et al. (2020), dm_control: Software and tasks for continuous control. A step of the
 environment holds the torques; its cost is known one step later, when the ground force at its end
-is, so the reward of a step belongs to the step before it.
+is, so the reward of a step belongs to the step before it. What the reward is and why it pays to
+walk: :mod:`walking_irl.domains.humanoid.closed_loop.progress`.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from dm_env import specs
 from walking_irl.arrays import Array, Indices
 from walking_irl.domains.humanoid.body.anatomy import Walker
 from walking_irl.domains.humanoid.body.physics import WalkerPhysics
+from walking_irl.domains.humanoid.closed_loop.progress import FALL_METRES, price_of_progress
 from walking_irl.domains.humanoid.costs.objectives import (
     OBJECTIVES,
     REFERENCE_SPEED,
@@ -104,11 +106,13 @@ class _Simulation(WalkerPhysics):
 
 
 class Walk(control.Task):  # type: ignore[misc]
-    """Walk along a gait's phase without falling, for the reward w.phi.
+    """Walk along a gait's phase without falling, for progress and low costs.
 
     Attributes:
         phi: Feature vector of the last complete step, shape (K,): its mean over a whole cycle at
             the gait's speed is mu.
+        costs: Folded costs of that step, shape (K,), if it is as long as the gait's.
+        progress: Length of that step, in steps of the gait's mean length.
         last: The last step, recorded.
         n_steps: Steps since the start of the episode.
     """
@@ -120,22 +124,18 @@ class Walk(control.Task):  # type: ignore[misc]
         *,
         random: np.random.RandomState,
         weights: Array | None = None,
+        price: float = 0.0,
         steps_per_control: int = 1,
         disturbance: Disturbance | None = None,
     ) -> None:
-        """Set up the task; ``weights`` (K,) default to none, which saves the reward's work."""
-        if weights is not None and np.shape(weights) != (len(OBJECTIVES),):
-            raise InvalidInputError(
-                f"weights must have shape ({len(OBJECTIVES)},), got {np.shape(weights)}"
-            )
+        """Set up the task; without ``weights`` (K,) there is no reward, which saves its work."""
+        _check_weights(weights)
         self.walker, self.start, self.random = walker, start, random
-        self.weights = weights
+        self.weights, self.price = weights, price
         self.disturbance = disturbance or Disturbance()
         self.control_timestep = start.timestep * steps_per_control
         self.steps_per_cycle = round(start.period / self.control_timestep)
-        self.phi = np.zeros(len(OBJECTIVES))
-        self.last: Step | None = None
-        self.n_steps = 0
+        self._forget()
         self._steps_per_control = steps_per_control
         self._layout = layout(walker)
         stage = np.repeat(walker.model.sensor_needstage, walker.model.sensor_dim)
@@ -149,7 +149,12 @@ class Walk(control.Task):  # type: ignore[misc]
         self._pitch = walker.joints.index("root_pitch")
         self._pelvis = walker.model.body("pelvis").id
         self._kick_at = -1
-        self._pushing = False
+
+    def _forget(self) -> None:
+        """Nothing has happened yet."""
+        self.last: Step | None = None
+        self.phi, self.costs = np.zeros(len(OBJECTIVES)), np.zeros(len(OBJECTIVES))
+        self.progress, self.n_steps, self._pushing = 0.0, 0, False
 
     def initialize_episode(self, physics: WalkerPhysics) -> None:
         """Put the walker at the start of the gait."""
@@ -157,8 +162,7 @@ class Walk(control.Task):  # type: ignore[misc]
         data.qpos[:], data.qvel[:] = self.start.q, self.start.v
         if self.disturbance.velocity_noise > 0:
             self._kick(data, self.disturbance.velocity_noise)
-        self.n_steps, self.last, self._pushing = 0, None, False
-        self.phi = np.zeros(len(OBJECTIVES))
+        self._forget()
         self._kick_at = self.random.randint(self.steps_per_cycle)
 
     def before_step(self, action: Array, physics: WalkerPhysics) -> None:
@@ -182,7 +186,7 @@ class Walk(control.Task):  # type: ignore[misc]
         a = (data.qvel - v) / self.control_timestep
         step = Step(q, v, a, data.actuator_force.copy(), sensors)
         if self.weights is not None and self.last is not None:
-            self.phi = self._features(self.last, step)
+            self._evaluate(self.last, step)
         self.last = step
         self.n_steps += 1
         if self.disturbance.kicks > 0:
@@ -193,8 +197,15 @@ class Walk(control.Task):  # type: ignore[misc]
                 self._kick_at = self.random.randint(self.steps_per_cycle)
 
     def get_reward(self, physics: WalkerPhysics) -> float:
-        """w.phi of the last complete step."""
-        return 0.0 if self.weights is None else float(self.weights @ self.phi)
+        """Price x progress - w.costs of the last complete step; without a price, w.phi."""
+        if self.weights is None:
+            return 0.0
+        if not self.price:
+            return float(self.weights @ self.phi)
+        reward = self.price * self.progress - float(self.weights @ self.costs)
+        if self.has_fallen(physics):
+            reward -= self.price * FALL_METRES / (self.start.speed * self.control_timestep)
+        return reward
 
     def get_termination(self, physics: WalkerPhysics) -> float | None:
         """Ends the episode with discount 0 on a fall."""
@@ -230,7 +241,7 @@ class Walk(control.Task):  # type: ignore[misc]
         joints = self.walker.joints[self.walker.n_root :]
         return specs.BoundedArray((len(joints),), float, lower, upper, name="\t".join(joints))
 
-    def _features(self, step: Step, after: Step) -> Array:
+    def _evaluate(self, step: Step, after: Step) -> None:
         motion = Motion(
             q=step.q[None],
             v=step.v[None],
@@ -243,11 +254,12 @@ class Walk(control.Task):  # type: ignore[misc]
             distance=self.start.speed * self.control_timestep,
         )
         r = residuals(self.walker, self._layout, motion)
-        cost = costs(r, motion.pace) + fixed_cost(r)
-        # Seconds per metre, linearised at the gait's speed: the reward must feel a faster step.
-        slow = 1 - (after.q[0] - step.q[0]) / motion.distance
-        cost[_TIME] += slow * REFERENCE_SPEED / self.start.speed / OBJECTIVES[_TIME].scale
-        return -cost
+        self.costs = costs(r, motion.pace) + fixed_cost(r)
+        self.progress = float(after.q[0] - step.q[0]) / motion.distance
+        # Seconds per metre, linearised at the gait's speed: phi must feel a faster step.
+        self.phi = -self.costs
+        pace = REFERENCE_SPEED / self.start.speed / OBJECTIVES[_TIME].scale
+        self.phi[_TIME] -= (1 - self.progress) * pace
 
     def _push(self, data: mujoco.MjData, push: Push) -> None:
         active = push.time <= data.time < push.time + PUSH_DURATION
@@ -261,6 +273,13 @@ class Walk(control.Task):  # type: ignore[misc]
 
 
 _TIME = [o.name for o in OBJECTIVES].index("time")
+
+
+def _check_weights(weights: Array | None) -> None:
+    if weights is not None and np.shape(weights) != (len(OBJECTIVES),):
+        raise InvalidInputError(
+            f"weights must have shape ({len(OBJECTIVES)},), got {np.shape(weights)}"
+        )
 
 
 def _runs(indices: Indices) -> list[slice]:
@@ -283,6 +302,7 @@ def environment(
     *,
     rng: np.random.Generator,
     weights: Array | None = None,
+    price: float | None = None,
     steps_per_control: int = 1,
     time_limit: float = float("inf"),
     disturbance: Disturbance | None = None,
@@ -294,17 +314,23 @@ def environment(
         start: Where the walk begins and how fine the simulation is; see :func:`start_of`.
         rng: Source of the disturbances.
         weights: Of the reward, shape (K,); without them the reward is zero.
+        price: Of a metre of progress, in units of w.costs per metre; 0 makes the reward w.phi. By
+            default that of the shipped gaits of this kind of body, at which walking pays.
         steps_per_control: Simulation steps for which an action is held.
         time_limit: End of an episode [s].
         disturbance: Noise, kicks and pushes.
     """
     if steps_per_control < 1:
         raise InvalidInputError(f"steps_per_control must be 1 or more, got {steps_per_control}")
+    _check_weights(weights)
+    if price is None:
+        price = 0.0 if weights is None else price_of_progress(weights, walker.n_root == 3)
     task = Walk(
         walker,
         start,
         random=np.random.RandomState(rng.bit_generator),
         weights=weights,
+        price=price,
         steps_per_control=steps_per_control,
         disturbance=disturbance,
     )

@@ -86,7 +86,7 @@ def photograph(
     option.geomgroup[:] = [1, 1, 1, 0, 0, 0]
     option.sitegroup[:] = 0
     frames = []
-    renderer = _renderer(model, height * OVERSAMPLING, width * OVERSAMPLING)
+    renderer = open_renderer(model, height * OVERSAMPLING, width * OVERSAMPLING)
     with renderer:
         for q, (azimuth, elevation) in views:
             data.qpos[:] = q
@@ -96,7 +96,7 @@ def photograph(
             camera.lookat[:] = [q[0], 0 if side is None else q[side], look_at]
             camera.distance, camera.azimuth, camera.elevation = distance, azimuth, elevation
             renderer.update_scene(data, camera, option)
-            frames.append(_shrink(renderer.render()))
+            frames.append(shrink(renderer.render()))
     return frames
 
 
@@ -149,7 +149,13 @@ def _leg_geoms(walker: Walker, side: str, segments: tuple[str, ...] = LEG) -> li
     ]
 
 
-def _renderer(model: mujoco.MjModel, height: int, width: int) -> Any:
+def open_renderer(model: mujoco.MjModel, height: int, width: int) -> Any:
+    """MuJoCo's renderer without a screen, for frames of that many pixels.
+
+    Raises:
+        InvalidInputError: If a frame is larger than the model's buffer.
+        WalkingIRLError: If pictures cannot be drawn on this machine; it names what to install.
+    """
     glob = model.vis.global_
     if height > glob.offheight or width > glob.offwidth:
         raise InvalidInputError(
@@ -182,7 +188,7 @@ def _choose_headless_opengl() -> None:
             return
 
 
-def _shrink(picture: Image) -> Image:
+def shrink(picture: Image) -> Image:
     """Mean over blocks of pixels: smooth edges also where OpenGL has no multisampling."""
     h, w = (n // OVERSAMPLING for n in picture.shape[:2])
     blocks = picture.reshape(h, OVERSAMPLING, w, OVERSAMPLING, 3)
