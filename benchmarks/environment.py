@@ -19,6 +19,8 @@ from walking_irl.domains.humanoid.closed_loop.policy import TrackingPolicy, trac
 from walking_irl.domains.humanoid.closed_loop.rollout import rollout
 from walking_irl.domains.humanoid.costs.objectives import REFERENCE_WEIGHTS
 from walking_irl.domains.humanoid.gait.library import load_gaits
+from walking_irl.environments.agent import TrackingAgent
+from walking_irl.environments.walker import WalkerEnv
 from walking_irl.types import Rollout
 
 TARGET = 0.5
@@ -62,6 +64,19 @@ def in_environment(
     return run
 
 
+def in_gymnasium(walk: Rollout) -> Callable[[], None]:
+    """A loop over ``WalkerEnv.step`` with its baseline agent: observations, reward and phi."""
+    env = WalkerEnv(velocity_noise=0.0, time_limit=float("inf"))
+    agent = TrackingAgent.of(env)
+
+    def run() -> None:
+        seen, _ = env.reset(seed=0)
+        for _ in walk.u:
+            seen, *_ = env.step(agent.predict(seen)[0])
+
+    return run
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--cycles", type=int, default=25, help="gait cycles in a repetition")
@@ -77,6 +92,7 @@ def main() -> None:
         "environment, recorded torques": in_environment(policy, walk, replay=True),
         "environment, policy": in_environment(policy, walk),
         "environment, policy, reward": in_environment(policy, walk, reward=True),
+        "Gymnasium, baseline agent": in_gymnasium(walk),
         "rollout: policy, all recorded": lambda: rollout(walker, policy, cycles=cycles),
     }
     step = [t / len(walk.u) for t in medians(list(loops.values()), repeats)]

@@ -12,7 +12,12 @@ BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 ROWS = {
     "centres": ["ac    3 / 20", "cc    3 / 20", "mvie  3 / 20", "cg    3 / 20"],
     "closed_loop": ["reference"],
-    "environment": ["bare mj_step", "environment, policy", "rollout: policy, all recorded"],
+    "environment": [
+        "bare mj_step",
+        "environment, policy",
+        "Gymnasium, baseline agent",
+        "rollout: policy, all recorded",
+    ],
     "evaluated_policies": ["lqr, queries alone", "lqr, demonstration", "gridworld, iterates"],
     "forward_solver": ["gait solver, one iteration", "mujoco.minimize.least_squares"],
     "recovery": ["MuJoCo's inverse dynamics and derivatives", "linear algebra", "queries"],

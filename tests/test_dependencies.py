@@ -17,6 +17,7 @@ ALLOWED = {
     "rl": LEAVES,
     "domains": LEAVES | {"rl"},
     "baselines": LEAVES | {"geometry", "cpirl", "rl"},
+    "environments": LEAVES | {"domains", "rl"},
     "recording": LEAVES | {"geometry", "cpirl", "domains"},
 }
 """Packages of walking_irl that each folder may import, beside itself; the others may import all."""
