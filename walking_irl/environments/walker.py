@@ -36,11 +36,14 @@ class WalkerEnv(Env[Any, Any], EzPickle):
     """Walk without falling, for the reward ``price x progress - w.costs``.
 
     Actions are joint torques [Nm]; agents that want [-1, 1] wrap it in Gymnasium's
-    ``RescaleAction``. Observations are one vector, ``observation_names`` names its numbers. Every
-    ``info`` holds ``phi`` (6,), the features of the last complete step, ``progress`` (that step's
-    length in steps of the gait's mean length), ``x`` (way walked [m]) and ``fell``. A fall
-    terminates an episode, the time limit truncates it. The reward and ``phi`` of a step come with
-    the next one, when the ground force at its end is known.
+    ``RescaleAction``. Observations are one vector, ``observation_names`` names its numbers. A fall
+    terminates an episode, the time limit truncates it. The reward of a step, and what ``info`` says
+    of it, come with the next one, when the ground force at its end is known. Every ``info`` holds
+
+    - ``phi`` (6,): the features of the last complete step;
+    - ``costs`` (6,): its folded costs, if it were as long as the gait's;
+    - ``progress``: its length, in steps of the gait's mean length;
+    - ``x``: the way walked since the start [m]; ``fell``: whether the walker has fallen.
 
     Args:
         planar: Whether the body is the planar one.
@@ -160,7 +163,8 @@ class WalkerEnv(Env[Any, Any], EzPickle):
     def _info(self, fell: bool) -> dict[str, Any]:
         task = self.task
         x = float(self._env.physics.data.ptr.qpos[0] - task.start.q[0])
-        return {"phi": task.phi.copy(), "progress": task.progress, "x": x, "fell": fell}
+        phi, costs = task.phi.copy(), task.costs.copy()
+        return {"phi": phi, "costs": costs, "progress": task.progress, "x": x, "fell": fell}
 
     def _show(self) -> None:
         if self.render_mode != "human":
