@@ -69,6 +69,9 @@ def build_parser() -> argparse.ArgumentParser:
     view.add_argument(
         "--png", type=Path, metavar="FILE.png", help="render a picture without a screen instead"
     )
+    view.add_argument(
+        "--web", action="store_true", help="serve it to a browser on this machine, until Ctrl-C"
+    )
     view.add_argument("--frame", type=int, help="frame to render (default: the last)")
     sub.add_parser("domains", help="list domains, their objectives and solvers")
     return parser

@@ -9,6 +9,7 @@ import sys
 from rich.console import Console
 from rich.markup import escape
 
+from walking_irl.cli import browser
 from walking_irl.errors import InvalidInputError
 from walking_irl.files import check_ending, check_outputs
 
@@ -19,11 +20,15 @@ def run(args: argparse.Namespace, console: Console) -> int:
     """``walking-irl view``."""
     from walking_irl.recording.screenshot import open_viewer, save_screenshot
 
+    if args.web:
+        if args.png is not None:
+            raise InvalidInputError("choose one of --web and --png")
+        return browser.show(args.file, console)
     if args.png is None:
         if sys.platform.startswith("linux") and not any(map(os.environ.get, SCREENS)):
             raise InvalidInputError(
-                "there is no screen for the viewer; render a picture with --png FILE.png, or copy "
-                "the file to a machine with a screen"
+                "there is no screen for the viewer; render a picture with --png FILE.png, serve it "
+                "to a browser with --web, or copy the file to a machine with a screen"
             )
         open_viewer(args.file)
         console.print("the viewer is opening; move the frame slider to play")
