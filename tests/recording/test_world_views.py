@@ -12,12 +12,10 @@ import pytest
 from walking_irl.arrays import Array
 from walking_irl.cpirl.loop import cpirl
 from walking_irl.domains import DOMAINS, load
-from walking_irl.domains.mdp.driving import Driving, DrivingPicture
 from walking_irl.recording import Experiment, Recorder, style
-from walking_irl.recording.drawing import outline
 from walking_irl.recording.reader import Recording, inspect_recording
 from walking_irl.recording.style import PLAYBACK_RATE
-from walking_irl.recording.views.driving import FRAMES_PER_STEP, LAST_STEPS, Road, headline, play
+from walking_irl.recording.views.driving import FRAMES_PER_STEP, LAST_STEPS, Road
 from walking_irl.recording.views.lqr import FRAMES_PER_STEP as LQR_FRAMES
 from walking_irl.recording.views.path import LAST_LONGEST, LAST_PACE, PACE
 from walking_irl.recording.views.registry import VIEWS, World, world_of
@@ -253,43 +251,6 @@ def test_cars_are_where_the_drive_puts_them(shown: Shown) -> None:
         )
 
 
-def drive(domain: Driving, action: int) -> DrivingPicture:
-    """A drive that always takes one action: at the start it picks the speed."""
-    return domain.picture(np.full(domain.mdp.n_states, action), n_steps=30)
-
-
-def test_a_car_that_is_passed_is_followed_by_the_next_one() -> None:
-    picture = drive(Driving(), 1)
-    frames = play(Road(picture, 0.0), 29 * FRAMES_PER_STEP)
-    step = np.diff(frames.others[:, 0, 1])
-    forward = -0.1 * picture.advance[0] / FRAMES_PER_STEP
-    is_even = np.isclose(step, forward)
-    assert is_even.mean() > 0.9  # all but where the next car takes over
-    np.testing.assert_allclose(np.diff(frames.travelled), -forward)
-    takes_over = FRAMES_PER_STEP * (1 + np.flatnonzero(np.diff(picture.red[:, 1]) < 0))
-    assert takes_over.size and not is_even[takes_over - 1].any()
-    np.testing.assert_allclose(
-        frames.others[takes_over - 1, 1, 1] + forward, frames.others[takes_over, 0, 1]
-    )
-
-
-def test_collisions_and_leaving_the_road_are_the_features() -> None:
-    domain = Driving()
-    for action in range(3):
-        picture = drive(domain, action)
-        lacks = np.zeros((2, 30), dtype=bool)
-        for t in range(30):
-            dx, dy = np.abs(picture.blue[t] - picture.red[t])
-            lacks[:, t] = dx < 20 and dy < 40, abs(picture.blue[t, 0] - 160) > 20
-        np.testing.assert_array_equal(picture.is_colliding, lacks[0])
-        np.testing.assert_array_equal(picture.is_off_road, lacks[1])
-        hits, off = lacks.sum(axis=1)
-        speed = ("slow", "medium", "fast")[action]
-        assert headline("she", picture) == (
-            f"she: {speed}; of 30 steps {hits} collide, {off} leave the road"
-        )
-
-
 @only("driving")
 def test_colliding_cars_change_colour(shown: Shown) -> None:
     picture = shown.picture(shown.problem.expert.demonstration)
@@ -298,11 +259,6 @@ def test_colliding_cars_change_colour(shown: Shown) -> None:
     is_orange = colours >> 8 == int.from_bytes(bytes(style.FORCE), "big")
     assert picture.is_colliding[:LAST_STEPS].any()
     np.testing.assert_array_equal(is_orange[::FRAMES_PER_STEP], picture.is_colliding[:LAST_STEPS])
-
-
-def test_outlines_are_closed() -> None:
-    (ring,) = outline(np.array([[0.0, 1.0]]), np.array([[2.0, 4.0]]))
-    assert ring.tolist() == [[0, 1], [2, 1], [2, 4], [0, 4], [0, 1]]
 
 
 def test_a_domain_without_a_view_has_no_world() -> None:

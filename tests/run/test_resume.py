@@ -42,7 +42,7 @@ def same_after_resuming(call, folder, *argv, code=0):
     assert call(*argv, "--max-solves", 1, "--record", "short.rrd", "--json", "short.json")[0] == 1
     assert len(results(folder / "short.json")["history"]) == 1
     got, out, err = call(
-        *("--resume", "short.checkpoint.npz", "--max-solves", 60),
+        *("--resume", "short.checkpoint.npz", "--max-solves", 100),
         *("--record", "resumed.rrd", "--json", "resumed.json"),
     )
     assert got == code and not err and "1 known from before" in out

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from walking_irl.arrays import Array
+from walking_irl.domains.contract import Defaults
 from walking_irl.domains.exact import ExactDomain
 from walking_irl.domains.weights import checked_weights
 from walking_irl.errors import InvalidInputError
@@ -27,6 +28,8 @@ class FiniteDomain(ExactDomain):
         mdp: The world.
         method: Forward solver: "policy-iteration" (exact) or "value-iteration" (to 1e-9).
     """
+
+    defaults = Defaults(max_solves=100)  # milliseconds each; levels take up to 48 for 9 regions
 
     def __init__(
         self,
