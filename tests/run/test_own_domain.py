@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from own_domain import NoisyShop, Shop
 
-from walking_irl import domains
 from walking_irl.cli.main import main
-from walking_irl.domains import Entry, load, register
+from walking_irl.domains import DOMAINS, Entry, load, register
 from walking_irl.domains.contract import Domain
 from walking_irl.errors import InvalidInputError
 from walking_irl.recording.reader import Recording, inspect_recording
@@ -19,11 +18,13 @@ from walking_irl.run.setup import Setup
 
 
 @pytest.fixture(autouse=True)
-def own(monkeypatch):
-    """A registry of this test's own."""
-    monkeypatch.setattr(domains, "DOMAINS", dict(domains.DOMAINS))
+def own():
+    """Domains that are registered for the time of a test."""
     for make in (Shop, NoisyShop):
         register(make.name, Entry(make, "a shop", "looking at all 41 orders"))
+    yield
+    for make in (Shop, NoisyShop):
+        del DOMAINS[make.name]
 
 
 def promised():
@@ -31,7 +32,7 @@ def promised():
     return {name for name in vars(Domain) if not name.startswith("_")}
 
 
-@pytest.mark.parametrize("name", [*domains.DOMAINS, "shop"])
+@pytest.mark.parametrize("name", [*DOMAINS, "shop"])
 def test_every_domain_has_all_that_the_protocol_promises(name):
     domain = load(name)
     assert not [what for what in promised() if not hasattr(domain, what)]
