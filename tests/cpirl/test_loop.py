@@ -12,7 +12,7 @@ from walking_irl.cpirl.summary import summarise
 from walking_irl.domains.lqr import LQR
 from walking_irl.errors import InvalidInputError
 from walking_irl.expert import expert_from_returns
-from walking_irl.geometry.polyhedron import plane_basis
+from walking_irl.geometry.plane import plane_basis
 from walking_irl.types import Expert, Rule, Status
 
 

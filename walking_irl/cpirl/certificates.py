@@ -16,7 +16,8 @@ from walking_irl.arrays import Array
 from walking_irl.errors import InvalidInputError
 from walking_irl.geometry.centres.centre import Centre
 from walking_irl.geometry.game import finite_rows
-from walking_irl.geometry.polyhedron import WeightPolyhedron, plane_basis
+from walking_irl.geometry.plane import plane_basis
+from walking_irl.geometry.polyhedron import WeightPolyhedron
 
 
 def single_policy_bounds(P: WeightPolyhedron, D: Array) -> Array:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walking_irl.arrays import Array
-from walking_irl.geometry.polyhedron import feasible, plane_basis
+from walking_irl.geometry.plane import feasible, plane_basis
 
 SECANT_RATIO = 8.0
 """A secant whose curvature differs more than this from the model's is not trusted."""

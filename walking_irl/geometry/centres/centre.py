@@ -7,7 +7,8 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from walking_irl.arrays import Array
-from walking_irl.geometry.polyhedron import WeightPolyhedron, feasible
+from walking_irl.geometry.plane import feasible
+from walking_irl.geometry.polyhedron import WeightPolyhedron
 
 
 class Centre(NamedTuple):

@@ -16,7 +16,6 @@ from scipy.linalg import solve_triangular
 from walking_irl.arrays import Array
 from walking_irl.errors import SolverError
 from walking_irl.geometry.centres.centre import Centre, feasible_weights
-from walking_irl.geometry.halfspaces import whitened_rows
 from walking_irl.geometry.polyhedron import WeightPolyhedron
 
 GAP = 1e-9
@@ -47,11 +46,9 @@ def ellipsoid(P: WeightPolyhedron, *, rng: np.random.Generator | None = None) ->
         EmptyPolyhedronError: If the polyhedron is empty or flat.
         SolverError: If neither method finds an inscribed ellipsoid.
     """
-    centre = P.barrier
-    rows = whitened_rows(P.A, centre, P.b)
-    inscribed = _lazy_inscribed(rows)
-    z = centre.z + solve_triangular(centre.R, inscribed.centre)
-    half = solve_triangular(centre.R, np.linalg.cholesky(inscribed.square))
+    inscribed = _lazy_inscribed(P.whitened.rows)
+    z = P.whitened.to_plane(inscribed.centre)
+    half = solve_triangular(P.barrier.R, np.linalg.cholesky(inscribed.square))
     # Outer factor n, enlarged by the solver's relative error.
     return Centre(feasible_weights(P, z), z, half @ half.T, 1.0, len(z) * (1.0 + 1e-3))
 
