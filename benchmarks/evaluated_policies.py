@@ -27,8 +27,8 @@ import numpy as np
 from bench import table
 
 from walking_irl.arrays import Array
+from walking_irl.cpirl.endings import IntervalsNarrowerThan
 from walking_irl.cpirl.loop import cpirl
-from walking_irl.cpirl.stopping import IntervalsNarrowerThan
 from walking_irl.domains.humanoid.closed_loop.trials import Protocol
 from walking_irl.domains.humanoid.domain import Humanoid
 from walking_irl.domains.humanoid.gait.library import load_library

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from walking_irl.cpirl.loop import cpirl
+from walking_irl.cpirl.probes import Probing
 from walking_irl.cpirl.summary import summarise
 from walking_irl.domains.humanoid.closed_loop.trials import Protocol
 from walking_irl.domains.humanoid.domain import Humanoid
@@ -52,8 +53,7 @@ def main() -> None:
             min_weight=MIN_WEIGHT,
             rng=np.random.default_rng(args.seed),
             measure=domain.remeasure(protocol, args.seed, executor),
-            executor=executor,
-            probe=PROBE,
+            probe=Probing(PROBE, executor),
         )
         experiment = Experiment(
             domain=domain.name,

@@ -136,6 +136,11 @@ class Iteration:
     estimate: Array
     status: Status
 
+    @property
+    def widest(self) -> float:
+        """Width of the widest interval."""
+        return float(np.diff(self.intervals, axis=1).max())
+
 
 @dataclass(frozen=True)
 class Rollout:

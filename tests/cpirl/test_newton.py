@@ -8,7 +8,7 @@ from problems import without_sensitivity
 from scipy.optimize import minimize
 
 from walking_irl.cpirl.loop import cpirl
-from walking_irl.cpirl.newton import extremes, newton_step
+from walking_irl.cpirl.regret_model import extremes, newton_step
 from walking_irl.domains.lqr import LQR
 from walking_irl.errors import InvalidInputError
 from walking_irl.geometry.plane import plane_basis

@@ -155,14 +155,13 @@ def _setup(args: argparse.Namespace, before: Setup | None) -> Setup:
 
 def progress_line(it: Iteration, report: Report) -> str:
     """One line on an iteration."""
-    width = float(np.diff(it.intervals).max())
     solver = it.response.info.get("iterations")
     detail = f", {solver} solver iterations" if solver else ""
     rule = f"{it.rule.name.lower():6s}"
     scale = abs(float(it.w @ report.expert.mu))
     return (
         f"  {it.k + 1:3d} {rule}  regret {100 * it.regret / scale:9.5f} %  "
-        f"certificate {it.certificate:.1e}  widest interval {width:.4f}{detail}"
+        f"certificate {it.certificate:.1e}  widest interval {it.widest:.4f}{detail}"
     )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from walking_irl.arrays import Array
 from walking_irl.cpirl.gauge import freedom_in_words
-from walking_irl.cpirl.newton import reduced
+from walking_irl.cpirl.regret_model import reduced
 from walking_irl.errors import InvalidInputError
 from walking_irl.geometry.plane import plane_basis
 from walking_irl.geometry.polyhedron import EXACT_OBJECTIVES, WeightPolyhedron

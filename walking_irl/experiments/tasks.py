@@ -12,6 +12,7 @@ import numpy as np
 
 from walking_irl.arrays import Array
 from walking_irl.baselines import kelley, lpal, max_margin, mwal, projection
+from walking_irl.cpirl.algorithm3 import algorithm3
 from walking_irl.cpirl.loop import cpirl
 from walking_irl.domains.humanoid.closed_loop.trials import Protocol
 from walking_irl.domains.humanoid.domain import Humanoid
@@ -23,7 +24,6 @@ from walking_irl.domains.mdp.gridworld import Gridworld
 from walking_irl.domains.path.walking_path import WalkingPath
 from walking_irl.errors import InvalidInputError, WalkingIRLError
 from walking_irl.experiments.cutting import cutting_planes
-from walking_irl.geometry.centres import centre_rule
 from walking_irl.geometry.centres.gravity import gravity
 from walking_irl.geometry.game import game_lp
 from walking_irl.types import Expert, Response
@@ -232,8 +232,7 @@ def _cpirl(task: Task, clock: _Clock, expert: Expert, rng: np.random.Generator) 
         mu = it.response.mu
         if task.scored == "mixture":
             mu = _best_mixture(np.array(M), expert.mu)
-        width = float(np.ptp(it.intervals, axis=1).max())
-        yield State(mu, np.array(M), it.estimate, width)
+        yield State(mu, np.array(M), it.estimate, it.widest)
 
 
 def _best_mixture(M: Array, mu_E: Array) -> Array:
@@ -246,15 +245,14 @@ def _best_mixture(M: Array, mu_E: Array) -> Array:
 def _cutting(
     task: Task, clock: _Clock, expert: Expert, rng: np.random.Generator
 ) -> Iterator[State]:
-    has_utopia = task.method == "utopia"
-    if has_utopia:
-        rule: Any = centre_rule(task.arguments["centre"])
+    n = task.max_solves
+    if task.method == "utopia":
+        steps = algorithm3(clock, expert, centre=task.arguments["centre"], rng=rng, max_solves=n)
     else:
         rule = partial(gravity, n_samples=task.arguments["n_samples"])
+        steps = cutting_planes(clock, expert, rule, rng=rng, max_solves=n)
     M: list[Array] = []
-    for step in cutting_planes(
-        clock, expert, rule, rng=rng, max_solves=task.max_solves, has_utopia=has_utopia
-    ):
+    for step in steps:
         M.append(step.response.mu)
         yield State(step.response.mu, np.array(M), step.w, None)
 

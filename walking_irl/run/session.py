@@ -16,6 +16,7 @@ import numpy as np
 
 from walking_irl.arrays import Array
 from walking_irl.cpirl.loop import cpirl
+from walking_irl.cpirl.probes import Probing
 from walking_irl.errors import FallError, InvalidInputError, RecordingError, SolverError
 from walking_irl.run.case import Case, Setup
 from walking_irl.run.checkpoint import Remembering, SavedRun, save_run
@@ -227,8 +228,7 @@ def _learn(
             min_weight=case.min_weight,
             rng=np.random.default_rng(setup.seed),
             measure=case.measure,
-            executor=executor,
-            probe=PROBE,
+            probe=Probing(PROBE, executor),
         )
         start = time.perf_counter()
         for it in steps:

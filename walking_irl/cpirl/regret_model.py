@@ -1,8 +1,8 @@
-"""Newton's method on the expert's regret f(w) = V(w) - w.mu_E, in the simplex's plane.
+"""Quadratic model of the expert's regret f(w) = V(w) - w.mu_E near its minimum, and its steps.
 
-The gradient is mu(w) - mu_E, the Hessian the sensitivity d mu/d w. A domain's sensitivity may be
-wrong by a factor of two (Gauss-Newton), so secants between queries correct it (BFGS; Nocedal and
-Wright, *Numerical Optimization*, section 6.1).
+The gradient is mu(w) - mu_E, the Hessian the sensitivity d mu/d w, both in the simplex's plane. A
+domain's sensitivity may be wrong by a factor of two (Gauss-Newton), so secants between queries
+correct it (BFGS; Nocedal and Wright, *Numerical Optimization*, section 6.1).
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walking_irl.arrays import Array
+from walking_irl.cpirl.bundle import Bundle
 from walking_irl.geometry.plane import feasible, plane_basis
 
 SECANT_RATIO = 8.0
@@ -26,6 +27,50 @@ class Step(NamedTuple):
 
     w: Array
     decrease: float
+
+
+class RegretModel(NamedTuple):
+    """Quadratic model of the regret around the best query."""
+
+    best: int
+    """Index of that query."""
+    B: Array
+    """Hessian in the plane of the weights, shape (K-1, K-1)."""
+    step: Step
+    """To its minimum."""
+    prior: Array
+    """The Hessian before its secants: the last that could be trusted, shape (K-1, K-1)."""
+
+    @classmethod
+    def fit(cls, bundle: Bundle, min_distance: float, prior: Array | None = None) -> RegretModel:
+        """Model around the query that is predicted to be nearest to the minimum.
+
+        Args:
+            bundle: At least one of its responses has a sensitivity.
+            min_distance: Secants between closer queries say more about noise than about curvature.
+            prior: Of the model before, for a best query without a sensitivity.
+        """
+        W, gradients = bundle.W, bundle.M - bundle.mu
+        best = int(np.argmin(bundle.relative_regrets))
+        usable = np.ones(len(W), dtype=bool) if bundle.is_match.all() else ~bundle.is_match
+        for _ in range(2):
+            prior = _trusted_hessian(bundle, best, prior)
+            B = with_secants(prior, W, bundle.M, best, min_distance)
+            pairs = zip(W, gradients, strict=True)
+            steps = [newton_step(w, g, B, bundle.min_weight) for w, g in pairs]
+            best = int(np.argmin(np.where(usable, [s.decrease for s in steps], np.inf)))
+        prior = _trusted_hessian(bundle, best, prior)
+        B = with_secants(prior, W, bundle.M, best, min_distance)
+        return cls(best, B, newton_step(W[best], gradients[best], B, bundle.min_weight), prior)
+
+
+def _trusted_hessian(bundle: Bundle, best: int, prior: Array | None) -> Array:
+    """Sensitivity at the best query, else the last one that could be trusted; (K-1, K-1)."""
+    sensitivity = bundle.responses[best].sensitivity
+    if sensitivity is None and prior is not None:
+        return prior
+    known = [r.sensitivity for r in bundle.responses if r.sensitivity is not None]
+    return reduced(known[-1] if sensitivity is None else sensitivity)
 
 
 def reduced(sensitivity: Array) -> Array:

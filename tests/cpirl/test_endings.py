@@ -1,22 +1,23 @@
 """Stop rules on made-up iterations."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
+from walking_irl.cpirl.endings import CertificateBelow, EstimateSettled, IntervalsNarrowerThan
 from walking_irl.cpirl.loop import cpirl
-from walking_irl.cpirl.stopping import CertificateBelow, EstimateSettled, IntervalsNarrowerThan
 from walking_irl.domains.lqr import LQR
-from walking_irl.types import Status
+from walking_irl.geometry.polyhedron import WeightPolyhedron
+from walking_irl.types import Iteration, Response, Rule, Status
 
 
 def made_up(certificate=1.0, width=1.0, w=0.5):
-    return SimpleNamespace(
-        certificate=certificate,
-        intervals=np.array([[0.0, 0.1 * width], [0.5, 0.5 + width]]),
-        estimate=np.array([w, 1.0 - w]),
-    )
+    P = WeightPolyhedron.simplex(2)
+    mu = estimate = np.array([w, 1.0 - w])
+    intervals = np.array([[0.0, 0.1 * width], [0.5, 0.5 + width]])
+    return Iteration(
+        0, P, mu, Rule.CENTRE, Response(None, mu), 0.1, 0.1, certificate, intervals, estimate,
+        Status.CUT,
+    )  # fmt: skip
 
 
 def test_certificate_is_compared_with_the_newest_iteration():
