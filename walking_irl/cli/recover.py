@@ -23,7 +23,7 @@ from rich.table import Table
 
 from walking_irl.cli import DONE, FAILED, INTERRUPTED
 from walking_irl.cli.weights import parse_weights, show_weights
-from walking_irl.cpirl.summary import Recovery, noise_level, per_unit, volume_left
+from walking_irl.cpirl.summary import Summary, noise_level, per_unit, volume_left
 from walking_irl.domains import load
 from walking_irl.errors import InvalidInputError
 from walking_irl.files import check_ending, check_outputs, write_file
@@ -204,7 +204,7 @@ def show_report(report: Report, console: Console, walks: Path | None) -> None:
         console.print(f"to go on from here: walking-irl recover --resume {path} --max-solves N")
 
 
-def _show_certainty(report: Report, found: Recovery, console: Console) -> None:
+def _show_certainty(report: Report, found: Summary, console: Console) -> None:
     """What the weights are, how sure they are, and what limits them."""
     low, high = found.bracket
     if high <= 0.0:

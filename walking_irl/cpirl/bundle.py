@@ -16,10 +16,10 @@ from walking_irl.geometry.game import Game, game_lp
 from walking_irl.geometry.polyhedron import WeightPolyhedron
 from walking_irl.types import Expert, Response
 
-CONFIDENCE = 0.95
-ROUNDING = 1e-9
+_CONFIDENCE = 0.95
+_ROUNDING = 1e-9
 """Of returns, whose features are of order 1 where they are not all zero."""
-UNREACHED = 0.02
+_UNREACHED = 0.02
 """By how much, relative to |w.mu_E|, an expert may beat every policy: noise or a local solver."""
 
 
@@ -71,7 +71,7 @@ class Bundle:
         W = np.vstack([self.W, w])
         bundle = replace(self, responses=(*self.responses, response), W=W, extra=extra)
         best, claimed = float(bundle.values(w)), float(w @ (self.mu - self.error))
-        if best < claimed - UNREACHED * float(bundle.scale(w)) - ROUNDING:
+        if best < claimed - _UNREACHED * float(bundle.scale(w)) - _ROUNDING:
             raise InvalidInputError(
                 f"no policy achieves the expert's features: for the weights {np.round(w, 4)} the "
                 f"best policy's return is {best:.6g}, the expert's {claimed:.6g}; check the "
@@ -222,7 +222,7 @@ class Bundle:
     def quantile(self, n_tests: int) -> float:
         """Student's two-sided quantile for ``n_tests`` simultaneous intervals."""
         df = max(self.expert.n_samples - 1, 1) if self.expert.n_samples else 10**6
-        return float(student.ppf(1.0 - (1.0 - CONFIDENCE) / (2 * n_tests), df))
+        return float(student.ppf(1.0 - (1.0 - _CONFIDENCE) / (2 * n_tests), df))
 
 
 def _checked(response: Response, K: int) -> Response:

@@ -23,11 +23,11 @@ from walking_irl.types import Iteration, Status
 
 EndRule = Callable[[Outlook], Ending | None]
 
-FLOOR = 2e-5
+_FLOOR = 2e-5
 """Relative regret below which poor Newton steps mean the demonstration's own gap is reached."""
-EXACT_STEP, ESTIMATED_STEP = 2e-4, 1e-3
+_EXACT_STEP, _ESTIMATED_STEP = 2e-4, 1e-3
 """Newton step (L1) that counts as none."""
-BEATEN = -1e-8
+_BEATEN = -1e-8
 """Certificate, relative to the expert's features, that proves that a mixture beats it."""
 
 
@@ -44,9 +44,9 @@ def endings_of(levels: Levels, is_exact: bool, tol: float) -> Endings:
     return Endings(
         regret=(Matched(tol),) if levels.has_known_minimum else (Dominated(tol), GapCloses(tol)),
         newton=(
-            (gains_nothing, StepsEnd(EXACT_STEP), MatchIsBest(EXACT_STEP))
+            (gains_nothing, StepsEnd(_EXACT_STEP), MatchIsBest(_EXACT_STEP))
             if is_exact
-            else (NoiseExplains(ESTIMATED_STEP),)
+            else (NoiseExplains(_ESTIMATED_STEP),)
         ),
         dead_end=(repeats_itself, is_flat, is_empty),
     )
@@ -125,7 +125,7 @@ def gains_nothing(outlook: Outlook) -> Ending | None:
     """Poor steps where the regret is as low as the demonstration's own gap may be."""
     progress = outlook.progress
     assert progress is not None
-    is_over = progress.n_poor >= MOST_POOR and progress.gap <= FLOOR
+    is_over = progress.n_poor >= MOST_POOR and progress.gap <= _FLOOR
     return Ending(Status.CONVERGED) if is_over else None
 
 
@@ -198,7 +198,7 @@ def is_flat(outlook: Outlook) -> Ending | None:
 
 def is_empty(outlook: Outlook) -> Ending | None:
     """No weights are left: a mixture beats the expert, or its features are off."""
-    is_beaten = outlook.bundle.game.value < BEATEN * outlook.bundle.unit
+    is_beaten = outlook.bundle.game.value < _BEATEN * outlook.bundle.unit
     return Ending(Status.MIXTURE_DOMINATES if is_beaten else Status.EMPTY)
 
 

@@ -18,7 +18,7 @@ from walking_irl.errors import InvalidInputError
 from walking_irl.geometry.polyhedron import WeightPolyhedron
 from walking_irl.types import MODES, Mode
 
-BIAS_MARGIN = 1.25
+_BIAS_MARGIN = 1.25
 """Share of the best regret that a noisy expert's bias may explain."""
 
 
@@ -63,7 +63,7 @@ class Optimal:
         """See :class:`Levels`."""
         if bundle.is_exact or not bundle.responses:
             return np.zeros(bundle.K)
-        return np.full(bundle.K, BIAS_MARGIN * max(bundle.least_robust_regret, 0.0))
+        return np.full(bundle.K, _BIAS_MARGIN * max(bundle.least_robust_regret, 0.0))
 
     def probed(self, bundle: Bundle, level: float) -> Array:
         """See :class:`Levels`."""

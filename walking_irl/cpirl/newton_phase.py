@@ -22,17 +22,17 @@ from walking_irl.types import Rule
 Measure = Callable[[Any], tuple[Array, Array]]
 """Maps a policy to the mean (K,) and covariance (K, K) of its measured features."""
 
-NEWTON_GAP = 0.02
+_NEWTON_GAP = 0.02
 """Newton's method takes over once the best regret is within this of optimal, relative."""
-SLACK = 2e-4
+_SLACK = 2e-4
 """By how much, relative to |w.mu_E|, a Newton query may miss a cut."""
-CLEARLY_WORSE = 2e-4
+_CLEARLY_WORSE = 2e-4
 """Relative rise of the regret that noise does not explain."""
-LONGEST_STEP = 0.3
+_LONGEST_STEP = 0.3
 """Longest Newton step (L1) where min f is not known to be 0."""
 MOST_POOR = 2
 """Poor Newton queries in a row after which a centre is asked."""
-MEASURE_WITHIN, MEASURE_AGAIN, MOST_MEASUREMENTS = 0.1, 0.01, 2
+_MEASURE_WITHIN, _MEASURE_AGAIN, _MOST_MEASUREMENTS = 0.1, 0.01, 2
 """A learner's policy is measured once the step is below the first (L1), again if it moves."""
 
 
@@ -100,7 +100,7 @@ class ExactNewton:
             self._n_poor = 0
             return None
         cuts = bundle.rows(self.levels.explaining(bundle))
-        if float((cuts @ v).max()) > SLACK * float(bundle.scale(v)):
+        if float((cuts @ v).max()) > _SLACK * float(bundle.scale(v)):
             return None
         return Query(v, Rule.NEWTON, self.levels.polyhedron(bundle))
 
@@ -108,7 +108,7 @@ class ExactNewton:
         """See :class:`NewtonPhase`."""
         if outlook.model is None:
             return _best_query(outlook.bundle)
-        return _plausible(outlook.bundle, self._target(outlook, outlook.model), SLACK)
+        return _plausible(outlook.bundle, self._target(outlook, outlook.model), _SLACK)
 
     def _target(self, outlook: Outlook, model: RegretModel) -> Array:
         """Shorten a step that promises more than f, whose minimum is known to be 0."""
@@ -162,7 +162,7 @@ class EstimatedNewton:
         length = float(np.abs(model.step.w - bundle.W[model.best]).sum())
         self._lengths.append(length)
         f, lengths = bundle.relative_regrets, self._lengths
-        is_poor = outlook.rule is Rule.NEWTON and float(f[-1] - f[:-1].min()) > CLEARLY_WORSE
+        is_poor = outlook.rule is Rule.NEWTON and float(f[-1] - f[:-1].min()) > _CLEARLY_WORSE
         self._n_poor = self._n_poor + 1 if is_poor else 0
         progress = Progress(
             model.step.w,
@@ -196,17 +196,17 @@ class EstimatedNewton:
         """See :class:`NewtonPhase`."""
         if outlook.model is None:
             return _best_query(outlook.bundle)
-        return _plausible(outlook.bundle, outlook.model.step.w, NEWTON_GAP)
+        return _plausible(outlook.bundle, outlook.model.step.w, _NEWTON_GAP)
 
     def _corrected(self, outlook: Outlook) -> tuple[Bundle, RegretModel]:
         """Measure the best policy as the expert was measured, and correct the expert by it."""
         bundle, model = outlook.bundle, outlook.model
         assert model is not None
         w = bundle.W[model.best]
-        is_far = np.abs(model.step.w - w).sum() >= MEASURE_WITHIN
-        if self.measure is None or is_far or len(self._measured) >= MOST_MEASUREMENTS:
+        is_far = np.abs(model.step.w - w).sum() >= _MEASURE_WITHIN
+        if self.measure is None or is_far or len(self._measured) >= _MOST_MEASUREMENTS:
             return bundle, model
-        if self._measured and np.abs(w - self._measured[-1]).sum() <= MEASURE_AGAIN:
+        if self._measured and np.abs(w - self._measured[-1]).sum() <= _MEASURE_AGAIN:
             return bundle, model
         response = bundle.responses[model.best]
         mean, covariance = self.measure(response.policy)
@@ -222,12 +222,12 @@ def _has_sensitivity(bundle: Bundle) -> bool:
 
 
 def _is_near(bundle: Bundle, levels: Levels) -> bool:
-    return float(bundle.relative_regrets.min()) - levels.lower_bound(bundle) <= NEWTON_GAP
+    return float(bundle.relative_regrets.min()) - levels.lower_bound(bundle) <= _NEWTON_GAP
 
 
 def _share(length: float) -> float:
     """Of a step of this length (L1), such that it is not too long."""
-    return min(1.0, LONGEST_STEP / max(length, 1e-300))
+    return min(1.0, _LONGEST_STEP / max(length, 1e-300))
 
 
 def _best_query(bundle: Bundle) -> Array:

@@ -20,7 +20,7 @@ from walking_irl.cpirl.record import record
 from walking_irl.cpirl.regret_model import extremes
 from walking_irl.types import Forward, Iteration, Rule, Status
 
-MOST_PROBES, REACHED = 15, 1.02
+_MOST_PROBES, _REACHED = 15, 1.02
 """Probes of one bound in "set" mode, and the share of the level at which it counts as reached."""
 
 Queries = Generator[Query, Bundle, None]
@@ -53,11 +53,7 @@ class Probes:
         self.outlook, self.decision, self.probing = outlook, decision, probing
         self._queries: Queries = _none()
         self._solver: Callable[[Forward], Forward] = lambda forward: forward
-        if probing is not None and decision.status in (
-            Status.MATCHED,
-            Status.CONVERGED,
-            Status.GAP_CLOSED,
-        ):
+        if probing is not None and decision.status.has_weights:
             if outlook.levels.is_set:
                 self._queries = _until_reached(outlook, probing.level)
             else:
@@ -122,14 +118,14 @@ def _until_reached(outlook: Outlook, level: float) -> Queries:
     bundle = outlook.bundle
     own = outlook.levels.probed(bundle, level)
     for direction in np.vstack([np.eye(bundle.K), -np.eye(bundle.K)]):
-        for _ in range(MOST_PROBES):
+        for _ in range(_MOST_PROBES):
             P = bundle.polyhedron(own)
             w = P.support(direction)[1]
             if bundle.is_asked(w):
                 break
             bundle = yield Query(w, Rule.PROBE, P)
             f = float(bundle.robust_regrets(w[None])[0]) - bundle.expert.suboptimality
-            if f <= REACHED * float(w @ own):
+            if f <= _REACHED * float(w @ own):
                 break
 
 

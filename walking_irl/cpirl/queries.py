@@ -11,7 +11,7 @@ from walking_irl.errors import EmptyPolyhedronError
 from walking_irl.geometry.centres import CentreRule
 from walking_irl.types import Rule
 
-MOST_NUDGES = 2
+_MOST_NUDGES = 2
 
 
 def kelley(outlook: Outlook) -> Query | None:
@@ -58,7 +58,7 @@ class Centres:
         if not outlook.bundle.is_asked(centre):
             return Query(centre, Rule.CENTRE, P, centre)
         self._n_nudges += 1
-        if self._n_nudges > MOST_NUDGES:
+        if self._n_nudges > _MOST_NUDGES:
             return DeadEnd(None, centre)
         v = self.rng.dirichlet(np.ones(outlook.bundle.K))
         corner = P.support(v - v.mean())[1]

@@ -9,9 +9,7 @@ from walking_irl.cpirl.outlook import Decision, Outlook, Query
 from walking_irl.cpirl.regret_model import standard_errors
 from walking_irl.types import Iteration, Status
 
-SETTLED = (Status.CONVERGED, Status.MATCHED, Status.GAP_CLOSED, Status.PROBE)
-"""Endings at which the quadratic model of a noisy expert's regret can be trusted."""
-INTERVAL_FLOOR = 0.002
+_INTERVAL_FLOOR = 0.002
 """Added to the standard errors of estimated weights: what secants leave of the Hessian's error."""
 
 
@@ -47,10 +45,11 @@ def record(
 def _intervals(outlook: Outlook, decision: Decision, level: float | None) -> Array:
     """Cut-based bounds; for an estimated expert that converged t standard errors + a floor."""
     bundle, levels, w = outlook.bundle, outlook.levels, decision.estimate
-    if bundle.covariance is None or outlook.model is None or decision.status not in SETTLED:
+    is_settled = decision.status.has_weights or decision.status is Status.PROBE
+    if bundle.covariance is None or outlook.model is None or not is_settled:
         own = levels.explaining(bundle) if level is None else levels.probed(bundle, level)
         return bundle.intervals(own, w)
     half = bundle.quantile(1) * standard_errors(outlook.model.B, bundle.covariance)
-    bounds = np.c_[w - half - INTERVAL_FLOOR, w + half + INTERVAL_FLOOR]
+    bounds = np.c_[w - half - _INTERVAL_FLOOR, w + half + _INTERVAL_FLOOR]
     clipped: Array = np.clip(bounds, bundle.min_weight, 1.0)
     return clipped

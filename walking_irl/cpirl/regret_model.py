@@ -16,9 +16,9 @@ from walking_irl.arrays import Array
 from walking_irl.cpirl.bundle import Bundle
 from walking_irl.geometry.plane import feasible, plane_basis
 
-SECANT_RATIO = 8.0
+_SECANT_RATIO = 8.0
 """A secant whose curvature differs more than this from the model's is not trusted."""
-MUCH_SHORTENED = 0.05
+_MUCH_SHORTENED = 0.05
 """Share of a step to an extreme below which it follows the bound that it meets instead."""
 
 
@@ -55,12 +55,12 @@ class RegretModel(NamedTuple):
         usable = np.ones(len(W), dtype=bool) if bundle.is_match.all() else ~bundle.is_match
         for _ in range(2):
             prior = _trusted_hessian(bundle, best, prior)
-            B = with_secants(prior, W, bundle.M, best, min_distance)
+            B = _with_secants(prior, W, bundle.M, best, min_distance)
             pairs = zip(W, gradients, strict=True)
             steps = [newton_step(w, g, B, bundle.min_weight) for w, g in pairs]
             best = int(np.argmin(np.where(usable, [s.decrease for s in steps], np.inf)))
         prior = _trusted_hessian(bundle, best, prior)
-        B = with_secants(prior, W, bundle.M, best, min_distance)
+        B = _with_secants(prior, W, bundle.M, best, min_distance)
         return cls(best, B, newton_step(W[best], gradients[best], B, bundle.min_weight), prior)
 
 
@@ -83,7 +83,7 @@ def reduced(sensitivity: Array) -> Array:
     return positive
 
 
-def with_secants(B: Array, W: Array, M: Array, best: int, min_distance: float) -> Array:
+def _with_secants(B: Array, W: Array, M: Array, best: int, min_distance: float) -> Array:
     """BFGS updates of ``B`` with the pairs (query k, query ``best``), farthest first.
 
     Args:
@@ -104,7 +104,7 @@ def with_secants(B: Array, W: Array, M: Array, best: int, min_distance: float) -
             break
         s, y = S[k], Y[k]
         curvature, model = float(s @ y), float(s @ B @ s)
-        if not model / SECANT_RATIO < curvature < model * SECANT_RATIO:
+        if not model / _SECANT_RATIO < curvature < model * _SECANT_RATIO:
             continue
         Bs = B @ s
         B = B - np.outer(Bs, Bs) / model + np.outer(y, y) / curvature
@@ -184,7 +184,7 @@ def extremes(w: Array, B: Array, drop: float, min_weight: float) -> Array:
         for v in (step, -step):
             room = np.where(v < 0.0, (w - 0.5 * min_weight) / np.maximum(-v, 1e-300), np.inf)
             share = min(1.0, float(room.min()))
-            end = w + v if share < MUCH_SHORTENED else w + share * v
+            end = w + v if share < _MUCH_SHORTENED else w + share * v
             out.append(np.maximum(end, 0.5 * min_weight))
     W: Array = np.array(out) / np.sum(out, axis=1, keepdims=True)
     return W

@@ -15,12 +15,12 @@ from walking_irl.geometry.plane import plane_basis
 from walking_irl.geometry.polyhedron import EXACT_OBJECTIVES, WeightPolyhedron
 from walking_irl.types import Expert, Iteration, Objective, Status
 
-ROUNDING = 1e-13
+_ROUNDING = 1e-13
 """Returns below this, relative to the expert's largest feature, are reported as 0."""
 
 
 @dataclass(frozen=True)
-class Recovery:
+class Summary:
     """What a run found; see :func:`summarise`.
 
     Attributes:
@@ -58,7 +58,7 @@ class Recovery:
 
 def summarise(
     iterations: Sequence[Iteration], expert: Expert, objectives: Sequence[Objective] = ()
-) -> Recovery:
+) -> Summary:
     """Summary of the iterations of one run.
 
     Args:
@@ -76,12 +76,12 @@ def summarise(
     names = [o.name for o in objectives] or [f"objective {i + 1}" for i in range(K)]
     scales = np.array([o.scale for o in objectives] or np.ones(K))
     condition, weakest = _identifiability(iterations, names)
-    rounding = ROUNDING * float(np.abs(expert.mu).max())
+    rounding = _ROUNDING * float(np.abs(expert.mu).max())
     certificate, regret = (
         0.0 if abs(value) <= rounding else value for value in (last.certificate, last.best_regret)
     )
     whole = WeightPolyhedron.simplex(K, last.polyhedron.min_weight)
-    return Recovery(
+    return Summary(
         w=last.estimate,
         rule=_rule(iterations, has_model=condition is not None),
         intervals=last.intervals,
@@ -109,7 +109,7 @@ def per_unit(interval: Sequence[float], unit: str) -> str:
     return f"{low:.3g} - {high:.3g}" + ("" if unit == "1" else f" per {unit}")
 
 
-def volume_left(found: Recovery) -> str:
+def volume_left(found: Summary) -> str:
     """Share of all weights' volume that is left, in words."""
     is_exact = len(found.w) <= EXACT_OBJECTIVES
     return f"{'' if is_exact else 'very roughly '}{found.volume_ratio:.1e} of the volume of all"

@@ -18,7 +18,7 @@ from walking_irl.geometry.dual_simplex import maximise
 FLAT_RADIUS = 1e-7
 """Inscribed radius up to which a set counts as flat: its weights are known well enough there."""
 
-SMALLEST_SLACK = 1e-14
+_SMALLEST_SLACK = 1e-14
 """A smaller slack, of rows with norm 1, is rounding."""
 
 
@@ -90,10 +90,10 @@ def barrier_centre(A: Array, b: Array, z: Array, max_iter: int = 60) -> BarrierC
         z = z + t * step
         slack = b - A @ z
         y = slack if is_inside or t == 1.0 else y * (1.0 - t * rate)
-        if is_inside and decrement <= 1e-14 or y.min() < SMALLEST_SLACK:
+        if is_inside and decrement <= 1e-14 or y.min() < _SMALLEST_SLACK:
             break
     # A decrement up to 1e-6 is rounding in the slacks of a very thin set: still well centred.
-    if not decrement <= 1e-6 or slack.min() < SMALLEST_SLACK:
+    if not decrement <= 1e-6 or slack.min() < _SMALLEST_SLACK:
         raise SolverError(f"analytic centre: Newton decrement {decrement:.1e}")
     return BarrierCentre(z, np.asarray(np.linalg.qr(A / slack[:, None], mode="r")), slack)
 

@@ -21,7 +21,7 @@ from walking_irl.arrays import Array
 from walking_irl.geometry.dual_simplex import maximise
 from walking_irl.geometry.halfspaces import BarrierCentre
 
-LAWRENCE_AGREEMENT = 1e-6
+_LAWRENCE_AGREEMENT = 1e-6
 """Relative difference of two volumes by Lawrence's formula that rounding explains."""
 
 
@@ -121,7 +121,7 @@ class Whitened(NamedTuple):
                 met = []
             if met and all(len(f) == n for f in met):
                 first, second = (_lawrence(self.rows[np.array(met)], seed) for seed in (1, 2))
-                if first > 0 and abs(first - second) < LAWRENCE_AGREEMENT * first:
+                if first > 0 and abs(first - second) < _LAWRENCE_AGREEMENT * first:
                     return first
         return _hull_volume(self.vertices())
 

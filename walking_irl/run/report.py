@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from walking_irl.arrays import Array
-from walking_irl.cpirl.summary import Recovery, summarise
+from walking_irl.cpirl.summary import Summary, summarise
 from walking_irl.errors import InvalidInputError, WalkingIRLError
 from walking_irl.files import write_file
 from walking_irl.types import Expert, Iteration, Objective, Rule, Status
@@ -80,7 +80,7 @@ class Report:
         return self.iterations[-1]
 
     @property
-    def recovery(self) -> Recovery:
+    def recovery(self) -> Summary:
         """What was found, how sure it is, and what limits it."""
         return summarise(self.iterations, self.expert, self.objectives)
 
@@ -165,7 +165,7 @@ class Report:
         }
 
 
-def _summary(r: Recovery) -> dict[str, Any]:
+def _summary(r: Summary) -> dict[str, Any]:
     return {
         "rule": r.rule,
         "bracket": list(r.bracket),

@@ -13,7 +13,7 @@ from walking_irl.errors import InvalidInputError
 from walking_irl.geometry.centres.centre import Centre, feasible_weights
 from walking_irl.geometry.polyhedron import WeightPolyhedron
 
-EXACT_OBJECTIVES = 5
+_EXACT_OBJECTIVES = 5
 """Largest number of objectives for which the centroid is exact (by triangulation)."""
 
 
@@ -40,7 +40,7 @@ def gravity(P: WeightPolyhedron, *, rng: np.random.Generator, n_samples: int = 4
     if n_samples < fewest:
         raise InvalidInputError(f"n_samples must be at least {fewest}, got {n_samples}")
     n = P.n_objectives - 1
-    if n < EXACT_OBJECTIVES:
+    if n < _EXACT_OBJECTIVES:
         mean, covariance = _moments(P.whitened.vertices())
     else:
         samples = hit_and_run(P.whitened.rows, n_samples, rng)
