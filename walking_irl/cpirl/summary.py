@@ -119,14 +119,14 @@ def noise_level(expert: Expert) -> str:
     """How well the expert's features are known, in words.
 
     >>> noise_level(Expert(np.array([2.0, 4.0]), np.array([0.1, 0.1]), n_samples=20))
-    'known from 20 recorded walks to within 5 % each'
+    'known from 20 trajectories to within 5 % each'
     """
     if not np.any(expert.error):
         return "known exactly"
     size = np.abs(expert.mu)
     relative = 100 * np.max(expert.error / np.maximum(size, 1e-3 * max(size.max(), 1e-300)))
-    walks = f" from {expert.n_samples} recorded walks" if expert.n_samples else ""
-    return f"known{walks} to within {relative:.2g} % each"
+    seen = f" from {expert.n_samples} trajectories" if expert.n_samples else ""
+    return f"known{seen} to within {relative:.2g} % each"
 
 
 def _rule(iterations: Sequence[Iteration], has_model: bool) -> str:
