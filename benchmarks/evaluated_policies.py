@@ -28,8 +28,8 @@ import numpy as np
 from bench import table
 
 from walking_irl.arrays import Array
+from walking_irl.cpirl.endings import IntervalsNarrowerThan
 from walking_irl.cpirl.loop import cpirl
-from walking_irl.cpirl.stopping import IntervalsNarrowerThan
 from walking_irl.domains.contract import Request
 from walking_irl.domains.humanoid.domain import Humanoid
 from walking_irl.domains.humanoid.gait.library import load_library
@@ -227,7 +227,7 @@ def recover(setting: Setting, expert: Expert, centre: str, names: Sequence[str])
     last = list(steps)[-1]
     if last.status not in (Status.MATCHED, Status.CONVERGED):
         raise RuntimeError(f"{setting.name}, {' + '.join(names)}: {last.status.value}")
-    return Outcome(last.k + 1, forward.n_policies, float(np.ptp(last.intervals, axis=1).max()))
+    return Outcome(last.k + 1, forward.n_policies, last.widest)
 
 
 def compare(setting: Setting, centre: str, n_experts: int) -> tuple[list[list[str]], str]:

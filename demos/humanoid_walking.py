@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from walking_irl.cpirl.loop import cpirl
+from walking_irl.cpirl.probes import Probing
 from walking_irl.cpirl.summary import summarise
 from walking_irl.domains.contract import Request
 from walking_irl.domains.humanoid.domain import Humanoid
@@ -50,8 +51,7 @@ def main() -> None:
             min_weight=domain.defaults.min_weight,
             rng=np.random.default_rng(args.seed),
             measure=learner.measure,
-            executor=executor,
-            probe=PROBE,
+            probe=Probing(PROBE, executor),
         )
         experiment = Experiment(
             domain=domain.name,

@@ -53,7 +53,7 @@ def compare(report: Report) -> int:
         print(f"{'cost':12s}{'walker':>9s}{'found':>9s}{'saved':>9s}")
         for objective, a, b in zip(report.objectives, costs, -best.response.mu, strict=True):
             print(f"{objective.name:12s}{a:9.4f}{b:9.4f}{100 * (a - b) / a:8.1f} %")
-    low, high = report.recovery.bracket
+    low, high = report.summary.bracket
     print(f"the best mixture of gaits beats the walker by {low:.4f} to {high:.4f} in every cost")
     print(f"recording: {report.recording}")
     return 0 if report.is_success else 1

@@ -95,6 +95,22 @@ class Status(enum.Enum):
     STALLED = "the query repeats itself and the solver finds nothing better"
     BUDGET = "the budget of forward solves is spent"
 
+    @property
+    def is_success(self) -> bool:
+        """Whether a run that ended so answers what the expert's weights are, or that none are."""
+        return self in (
+            Status.MATCHED,
+            Status.CONVERGED,
+            Status.GAP_CLOSED,
+            Status.DOMINATED,
+            Status.MIXTURE_DOMINATES,
+        )
+
+    @property
+    def has_weights(self) -> bool:
+        """Whether a run that ended so has found weights to be sure of."""
+        return self in (Status.MATCHED, Status.CONVERGED, Status.GAP_CLOSED)
+
 
 class Rule(enum.Enum):
     """How a query was chosen."""
@@ -135,6 +151,11 @@ class Iteration:
     intervals: Array
     estimate: Array
     status: Status
+
+    @property
+    def widest(self) -> float:
+        """Width of the widest interval."""
+        return float(np.diff(self.intervals, axis=1).max())
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,6 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from problems import TWO_POLICIES
 
 from walking_irl.domains import load
 from walking_irl.errors import InvalidInputError
@@ -21,14 +20,10 @@ from walking_irl.experiments import (
     runner,
     walking_path,
 )
-from walking_irl.experiments.cutting import cutting_planes, utopia
 from walking_irl.experiments.picture import solves_chart, steps_chart
 from walking_irl.experiments.runner import Row, Runner
 from walking_irl.experiments.table import COLUMNS
 from walking_irl.experiments.tasks import Task, run_task, synthetic_expert
-from walking_irl.geometry.centres import centre_rule
-from walking_irl.geometry.game import game_lp
-from walking_irl.types import Expert
 
 SVG = "{http://www.w3.org/2000/svg}"
 CLOCKED = ("seconds", "query_seconds")
@@ -159,34 +154,6 @@ def test_a_failing_seed_is_reported_and_does_not_lose_the_table():
     assert "0/2" in table.rows[0]
     assert any("failed on 2 seeds" in n and "finitely many states" in n for n in table.notes)
     assert len(table.rows[0]) == len(COLUMNS)
-
-
-def test_utopia_is_a_pareto_point_above_the_expert():
-    W, M = np.eye(2), np.array([[1.0, 0.0], [0.0, 1.0]])
-    mu_E = np.array([0.4, 0.4])
-    x = utopia(W, M, mu_E)
-    assert (x >= mu_E).all()
-    np.testing.assert_allclose(x, 1.0)
-    x = utopia(np.vstack([W, [0.5, 0.5]]), np.vstack([M, [1.0, 0.0]]), mu_E)
-    assert x.sum() == pytest.approx(1.0)
-
-
-def test_algorithm_3_gives_up_where_only_a_mixture_dominates():
-    expert = Expert(np.array([0.4, 0.4]), np.zeros(2))
-    steps = list(
-        cutting_planes(
-            TWO_POLICIES.forward,
-            expert,
-            centre_rule("ac"),
-            rng=np.random.default_rng(0),
-            max_solves=20,
-            has_utopia=True,
-        )
-    )
-    assert 2 <= len(steps) < 20, "both policies are found, and then nothing is left to ask"
-    M = np.array([s.response.mu for s in steps])
-    assert {tuple(mu) for mu in M} == {(1.0, 0.0), (0.0, 1.0)}
-    assert game_lp(M - expert.mu).value == pytest.approx(-0.1), "their mixture dominates"
 
 
 @pytest.mark.parametrize(

@@ -9,13 +9,14 @@ import pytest
 from problems import without_sensitivity
 
 from walking_irl.baselines import BASELINES, Setting, max_margin, mwal, projection
+from walking_irl.cpirl.algorithm3 import algorithm3
 from walking_irl.cpirl.loop import cpirl
 from walking_irl.domains.lqr import LQR
 from walking_irl.domains.mdp.gridworld import Gridworld
 from walking_irl.experiments import contenders, rows, runner, tasks
-from walking_irl.experiments.cutting import cutting_planes
 from walking_irl.experiments.runner import Runner
 from walking_irl.experiments.tasks import Task, run_task, synthetic_expert
+from walking_irl.geometry.centres.analytic import analytic
 from walking_irl.geometry.game import game_lp
 from walking_irl.run import stopwatch
 
@@ -82,10 +83,7 @@ def test_algorithm_3_rows_run_the_utopia():
     for seed in range(4):
         task = replace(POOR, method="utopia", seed=seed, least_advantage=0.002, max_solves=60)
         domain, _, expert, rng = the_expert(task)
-        rule = contenders.centre_rule("ac")
-        run = list(
-            cutting_planes(domain.forward, expert, rule, rng=rng, max_solves=60, has_utopia=True)
-        )
+        run = list(algorithm3(domain.forward, expert, centre="ac", rng=rng, max_solves=60))
         good = [bool((s.response.mu - expert.mu).min() >= 0) for s in run]
         outcome = run_task(task)
         assert outcome["solves"] == (first(good) if any(good) else len(run))
@@ -135,7 +133,7 @@ def test_figure_samples_as_often_as_it_says(monkeypatch, n):
 
     def gravity(P, *, rng, n_samples):
         asked.append(n_samples)
-        return contenders.centre_rule("ac")(P, rng=rng)
+        return analytic(P)
 
     monkeypatch.setattr(contenders, "gravity", gravity)
     run_task(replace(OPTIMAL, method="samples", arguments={"n_samples": n}))

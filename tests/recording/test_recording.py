@@ -154,7 +154,7 @@ def test_weakest_direction_and_noise_are_told_where_they_are_known(tmp_path: Pat
     assert found["condition_number"] == pytest.approx(expected.condition_number)
     assert found["weakest"] == expected.weakest and f"**{expected.weakest}**" in text
     np.testing.assert_allclose(found["noise"], expert.error)
-    assert "known from 7 recorded walks to within 2 % each" in text
+    assert "known from 7 trajectories to within 2 % each" in text
 
 
 def test_summary_tells_true_and_recovered_weights(recorded: Recording) -> None:

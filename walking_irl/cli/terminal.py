@@ -18,7 +18,7 @@ from rich.progress import (
 from rich.table import Table
 
 from walking_irl.cli.weights import show_weights
-from walking_irl.cpirl.summary import Recovery, noise_level, per_unit, volume_left
+from walking_irl.cpirl.summary import Summary, noise_level, per_unit, volume_left
 from walking_irl.files import write_arrays
 from walking_irl.run.problem import Problem
 from walking_irl.run.report import Report, progress_line
@@ -99,7 +99,7 @@ def show_report(report: Report, console: Console, rollouts: Path | None) -> None
     console.print(_weights_table(report))
     out = report.to_json()
     console.print(f"ended: {report.status}")
-    found = report.recovery
+    found = report.summary
     console.print(f"certificate {found.certificate:.2e} (return that some mixture may lose)")
     _show_certainty(report, found, console)
     if report.l1_error is not None:
@@ -137,7 +137,7 @@ def _weights_table(report: Report) -> Table:
     return table
 
 
-def _show_certainty(report: Report, found: Recovery, console: Console) -> None:
+def _show_certainty(report: Report, found: Summary, console: Console) -> None:
     """What the weights are, how sure they are, and what limits them."""
     low, high = found.bracket
     if high <= 0.0:

@@ -11,10 +11,10 @@ import numpy as np
 from walking_irl.arrays import Array
 from walking_irl.baselines import BASELINES, lpal
 from walking_irl.baselines.loop import Baseline, Setting
+from walking_irl.cpirl.algorithm3 import Step, algorithm3
 from walking_irl.cpirl.loop import cpirl
 from walking_irl.errors import InvalidInputError
 from walking_irl.experiments.cutting import cutting_planes
-from walking_irl.geometry.centres import centre_rule
 from walking_irl.geometry.centres.gravity import gravity
 from walking_irl.geometry.game import game_lp
 from walking_irl.types import Expert, Forward
@@ -80,8 +80,7 @@ def _cpirl(task: Task, contest: Contest) -> Iterator[State]:
         mu = it.response.mu
         if task.scored == "mixture":
             mu = _best_mixture(np.array(M), contest.expert.mu)
-        width = float(np.ptp(it.intervals, axis=1).max())
-        yield State(mu, np.array(M), it.estimate, width)
+        yield State(mu, np.array(M), it.estimate, it.widest)
 
 
 def _best_mixture(M: Array, mu_E: Array) -> Array:
@@ -91,20 +90,21 @@ def _best_mixture(M: Array, mu_E: Array) -> Array:
     return mu
 
 
-def _cutting(task: Task, contest: Contest, has_utopia: bool) -> Iterator[State]:
-    if has_utopia:
-        rule = centre_rule(task.arguments["centre"])
-    else:
-        rule = partial(gravity, n_samples=task.arguments["n_samples"])
+def _algorithm3(task: Task, contest: Contest) -> Iterator[State]:
+    centre, n = task.arguments["centre"], task.max_solves
+    run = algorithm3(contest.forward, contest.expert, centre=centre, rng=contest.rng, max_solves=n)
+    return _queried(run)
+
+
+def _samples(task: Task, contest: Contest) -> Iterator[State]:
+    centre, n = partial(gravity, n_samples=task.arguments["n_samples"]), task.max_solves
+    run = cutting_planes(contest.forward, contest.expert, centre, rng=contest.rng, max_solves=n)
+    return _queried(run)
+
+
+def _queried(run: Iterator[Step]) -> Iterator[State]:
     M: list[Array] = []
-    for step in cutting_planes(
-        contest.forward,
-        contest.expert,
-        rule,
-        rng=contest.rng,
-        max_solves=task.max_solves,
-        has_utopia=has_utopia,
-    ):
+    for step in run:
         M.append(step.response.mu)
         yield State(step.response.mu, np.array(M), step.w, None)
 
@@ -126,7 +126,7 @@ def _baseline(task: Task, contest: Contest, method: Baseline) -> Iterator[State]
 
 METHODS: dict[str, Callable[[Task, Contest], Iterator[State]]] = {
     "cpirl": _cpirl,
-    "utopia": partial(_cutting, has_utopia=True),
-    "samples": partial(_cutting, has_utopia=False),
+    "utopia": _algorithm3,
+    "samples": _samples,
 }
 """CPIRL's own by name; the others are the baselines."""

@@ -159,8 +159,7 @@ def line(it: Iteration) -> str:
     """One line on an iteration, for the log."""
     return (
         f"{it.k}: {it.rule.value}; regret {it.regret:.2e}, best {it.best_regret:.2e}, "
-        f"certificate {it.certificate:.2e}; widest interval "
-        f"{np.ptp(it.intervals, axis=1).max():.4f}; {it.status.value}"
+        f"certificate {it.certificate:.2e}; widest interval {it.widest:.4f}; {it.status.value}"
     )
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from walking_irl.cpirl.summary import Recovery, noise_level, per_unit, volume_left
+from walking_irl.cpirl.summary import Summary, noise_level, per_unit, volume_left
 from walking_irl.recording.experiment import Experiment
 from walking_irl.recording.panels import panels
 from walking_irl.types import Status
@@ -14,7 +14,7 @@ from walking_irl.versions import versions
 
 
 def summary(
-    experiment: Experiment, found: Recovery | None, world: str, ending: str | None = None
+    experiment: Experiment, found: Summary | None, world: str, ending: str | None = None
 ) -> str:
     """Markdown: what is shown, true and recovered weights, how sure they are, how to read it.
 
@@ -36,7 +36,7 @@ def summary(
     return "\n\n".join(parts)
 
 
-def _result(experiment: Experiment, found: Recovery) -> str:
+def _result(experiment: Experiment, found: Summary) -> str:
     text = f"**{found.n_solves} iterations**: {found.status.value}."
     if found.status in (Status.DOMINATED, Status.MIXTURE_DOMINATES):
         return text + " No weights make this expert optimal; those below bring it nearest to it."
@@ -46,7 +46,7 @@ def _result(experiment: Experiment, found: Recovery) -> str:
     return text
 
 
-def _table(experiment: Experiment, found: Recovery) -> str:
+def _table(experiment: Experiment, found: Summary) -> str:
     w_expert = experiment.w_expert
     head = ["objective", "ground truth", "recovered", "interval"]
     is_scaled = any(o.scale != 1.0 for o in experiment.objectives)
@@ -63,7 +63,7 @@ def _table(experiment: Experiment, found: Recovery) -> str:
     return "\n".join(f"| {' | '.join(cells)} |" for cells in rows)
 
 
-def _certainty(experiment: Experiment, found: Recovery) -> str:
+def _certainty(experiment: Experiment, found: Summary) -> str:
     low, high = found.bracket
     lines = [
         f"The weights shown: {found.rule}.",
@@ -103,9 +103,7 @@ def _legend(experiment: Experiment, world: str) -> str:
     return "\n".join(text for text in lines if text)
 
 
-def properties(
-    experiment: Experiment, found: Recovery | None, ending: str | None
-) -> dict[str, Any]:
+def properties(experiment: Experiment, found: Summary | None, ending: str | None) -> dict[str, Any]:
     """Values of the property ``experiment``; what is not known is left out."""
     known: dict[str, Any] = {
         "domain": experiment.domain,

@@ -8,20 +8,12 @@ from typing import Any
 import numpy as np
 
 from walking_irl.arrays import Array
-from walking_irl.cpirl.summary import Recovery, summarise
+from walking_irl.cpirl.summary import Summary, summarise
 from walking_irl.errors import InvalidInputError, WalkingIRLError
 from walking_irl.run.problem import Problem
 from walking_irl.types import Expert, Iteration, Objective, Rule, Status
 from walking_irl.versions import versions
 
-SUCCESS = (
-    Status.MATCHED,
-    Status.CONVERGED,
-    Status.GAP_CLOSED,
-    Status.DOMINATED,
-    Status.MIXTURE_DOMINATES,
-)
-"""Endings that answer the question; any other leaves exit code 1."""
 INTERRUPTED = "interrupted"
 
 
@@ -78,7 +70,7 @@ class Report:
         return self.iterations[-1]
 
     @property
-    def recovery(self) -> Recovery:
+    def summary(self) -> Summary:
         """What was found, how sure it is, and what limits it."""
         return summarise(self.iterations, self.expert, self.objectives)
 
@@ -102,7 +94,7 @@ class Report:
     @property
     def is_success(self) -> bool:
         """Whether the run answers what the expert walks for."""
-        return not self.was_interrupted and not self.failure and self.ending in SUCCESS
+        return not self.was_interrupted and not self.failure and self.ending.is_success
 
     @property
     def contains_expert(self) -> bool | None:
@@ -152,7 +144,7 @@ class Report:
             "probe_solves": sum(it.rule is Rule.PROBE for it in self.iterations),
             "solves_to_1pct": self.solves_to_1pct,
             "status": self.status,
-            "summary": _summary(self.recovery),
+            "summary": _summary(self.summary),
             "seconds": self.seconds,
             "history": [_entry(it) for it in self.iterations],
             "recording": self.recording,
@@ -163,18 +155,17 @@ class Report:
 
 def progress_line(it: Iteration, report: Report) -> str:
     """One line on an iteration, for a terminal."""
-    width = float(np.diff(it.intervals).max())
     solver = it.response.info.get("iterations")
     detail = f", {solver} solver iterations" if solver else ""
     rule = f"{it.rule.name.lower():6s}"
     scale = abs(float(it.w @ report.expert.mu))
     return (
         f"  {it.k + 1:3d} {rule}  regret {100 * it.regret / scale:9.5f} %  "
-        f"certificate {it.certificate:.1e}  widest interval {width:.4f}{detail}"
+        f"certificate {it.certificate:.1e}  widest interval {it.widest:.4f}{detail}"
     )
 
 
-def _summary(r: Recovery) -> dict[str, Any]:
+def _summary(r: Summary) -> dict[str, Any]:
     return {
         "rule": r.rule,
         "bracket": list(r.bracket),

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from walking_irl.cpirl.loop import cpirl
+from walking_irl.cpirl.probes import Probing
 from walking_irl.domains.contract import OnStep
 from walking_irl.errors import FallError, InvalidInputError, RecordingError, SolverError
 from walking_irl.files import check_writable
@@ -145,8 +146,7 @@ def _timed(problem: Problem, watch: Stopwatch, executor: Executor | None) -> Ite
         min_weight=problem.domain.defaults.min_weight,
         rng=np.random.default_rng(problem.setup.seed),
         measure=problem.learner.measure,
-        executor=executor,
-        probe=PROBE,
+        probe=Probing(PROBE, executor),
     )
     start = time.perf_counter()
     for it in steps:

@@ -1,8 +1,8 @@
-"""Newton's method on the expert's regret f(w) = V(w) - w.mu_E, in the simplex's plane.
+"""Quadratic model of the expert's regret f(w) = V(w) - w.mu_E near its minimum, and its steps.
 
-The gradient is mu(w) - mu_E, the Hessian the sensitivity d mu/d w. A domain's sensitivity may be
-wrong by a factor of two (Gauss-Newton), so secants between queries correct it (BFGS; Nocedal and
-Wright, *Numerical Optimization*, section 6.1).
+The gradient is mu(w) - mu_E, the Hessian the sensitivity d mu/d w, both in the simplex's plane. A
+domain's sensitivity may be wrong by a factor of two (Gauss-Newton), so secants between queries
+correct it (BFGS; Nocedal and Wright, *Numerical Optimization*, section 6.1).
 """
 
 from __future__ import annotations
@@ -13,11 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walking_irl.arrays import Array
-from walking_irl.geometry.polyhedron import feasible, plane_basis
+from walking_irl.cpirl.bundle import Bundle
+from walking_irl.geometry.plane import feasible, plane_basis
 
-SECANT_RATIO = 8.0
+_SECANT_RATIO = 8.0
 """A secant whose curvature differs more than this from the model's is not trusted."""
-MUCH_SHORTENED = 0.05
+_MUCH_SHORTENED = 0.05
 """Share of a step to an extreme below which it follows the bound that it meets instead."""
 
 
@@ -26,6 +27,50 @@ class Step(NamedTuple):
 
     w: Array
     decrease: float
+
+
+class RegretModel(NamedTuple):
+    """Quadratic model of the regret around the best query."""
+
+    best: int
+    """Index of that query."""
+    B: Array
+    """Hessian in the plane of the weights, shape (K-1, K-1)."""
+    step: Step
+    """To its minimum."""
+    prior: Array
+    """The Hessian before its secants: the last that could be trusted, shape (K-1, K-1)."""
+
+    @classmethod
+    def fit(cls, bundle: Bundle, min_distance: float, prior: Array | None = None) -> RegretModel:
+        """Model around the query that is predicted to be nearest to the minimum.
+
+        Args:
+            bundle: At least one of its responses has a sensitivity.
+            min_distance: Secants between closer queries say more about noise than about curvature.
+            prior: Of the model before, for a best query without a sensitivity.
+        """
+        W, gradients = bundle.W, bundle.M - bundle.mu
+        best = int(np.argmin(bundle.relative_regrets))
+        usable = np.ones(len(W), dtype=bool) if bundle.is_match.all() else ~bundle.is_match
+        for _ in range(2):
+            prior = _trusted_hessian(bundle, best, prior)
+            B = _with_secants(prior, W, bundle.M, best, min_distance)
+            pairs = zip(W, gradients, strict=True)
+            steps = [newton_step(w, g, B, bundle.min_weight) for w, g in pairs]
+            best = int(np.argmin(np.where(usable, [s.decrease for s in steps], np.inf)))
+        prior = _trusted_hessian(bundle, best, prior)
+        B = _with_secants(prior, W, bundle.M, best, min_distance)
+        return cls(best, B, newton_step(W[best], gradients[best], B, bundle.min_weight), prior)
+
+
+def _trusted_hessian(bundle: Bundle, best: int, prior: Array | None) -> Array:
+    """Sensitivity at the best query, else the last one that could be trusted; (K-1, K-1)."""
+    sensitivity = bundle.responses[best].sensitivity
+    if sensitivity is None and prior is not None:
+        return prior
+    known = [r.sensitivity for r in bundle.responses if r.sensitivity is not None]
+    return reduced(known[-1] if sensitivity is None else sensitivity)
 
 
 def reduced(sensitivity: Array) -> Array:
@@ -38,7 +83,7 @@ def reduced(sensitivity: Array) -> Array:
     return positive
 
 
-def with_secants(B: Array, W: Array, M: Array, best: int, min_distance: float) -> Array:
+def _with_secants(B: Array, W: Array, M: Array, best: int, min_distance: float) -> Array:
     """BFGS updates of ``B`` with the pairs (query k, query ``best``), farthest first.
 
     Args:
@@ -59,7 +104,7 @@ def with_secants(B: Array, W: Array, M: Array, best: int, min_distance: float) -
             break
         s, y = S[k], Y[k]
         curvature, model = float(s @ y), float(s @ B @ s)
-        if not model / SECANT_RATIO < curvature < model * SECANT_RATIO:
+        if not model / _SECANT_RATIO < curvature < model * _SECANT_RATIO:
             continue
         Bs = B @ s
         B = B - np.outer(Bs, Bs) / model + np.outer(y, y) / curvature
@@ -139,7 +184,7 @@ def extremes(w: Array, B: Array, drop: float, min_weight: float) -> Array:
         for v in (step, -step):
             room = np.where(v < 0.0, (w - 0.5 * min_weight) / np.maximum(-v, 1e-300), np.inf)
             share = min(1.0, float(room.min()))
-            end = w + v if share < MUCH_SHORTENED else w + share * v
+            end = w + v if share < _MUCH_SHORTENED else w + share * v
             out.append(np.maximum(end, 0.5 * min_weight))
     W: Array = np.array(out) / np.sum(out, axis=1, keepdims=True)
     return W
