@@ -38,7 +38,7 @@ def main() -> None:
     parser.add_argument("--planar", action="store_true", help="a smaller body, in a plane")
     args = parser.parse_args()
 
-    domain = Humanoid(planar=args.planar)
+    domain = Humanoid("humanoid-planar" if args.planar else "humanoid")
     names = [o.name for o in domain.objectives]
     gaits: dict[str, Gait] = {}
     costs = []

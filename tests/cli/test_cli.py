@@ -87,14 +87,14 @@ def one_sentence(err):
 
 @pytest.fixture(scope="module")
 def planar():
-    return Humanoid(planar=True).walker
+    return Humanoid("humanoid-planar").walker
 
 
 @pytest.fixture(scope="module")
 def demonstration(tmp_path_factory, planar):
     """A shipped planar gait as .npz; its columns by name."""
     path = tmp_path_factory.mktemp("gait") / "gait.npz"
-    save_gait(path, load_gaits(planar=True)["reference"], planar)
+    save_gait(path, load_gaits("humanoid-planar")["reference"], planar)
     with np.load(path) as data:
         return path, {name: data[name] for name in data.files}
 

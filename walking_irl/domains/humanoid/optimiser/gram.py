@@ -35,17 +35,18 @@ def window_matrices(at: Weighted) -> Array:
         if place.joints is None and place.term.reads:
             rows = _rows(lin, place, block) * at.factors.costs[place.columns, None]
             (wide if rows.shape[2] > 3 * nv + 1 else narrow).append(rows)
-    h = np.zeros((n, 4 * nv + 1, 4 * nv + 1))
     if wide:
         rows = np.concatenate(wide, axis=1)
-        np.matmul(np.swapaxes(rows, 1, 2), rows, out=h)
+        h = np.matmul(np.swapaxes(rows, 1, 2), rows)
+    else:
+        h = np.zeros((n, 4 * nv + 1, 4 * nv + 1))
     rows = np.concatenate(narrow, axis=1)
     _add_narrow(h, np.matmul(np.swapaxes(rows, 1, 2), rows), nv)
     _add_joints(h, lin, gram[N_TORQUES:, N_TORQUES:])
     left, right = lin.problem.nv + lin.chain.feet
     align = (lin.rows[n // 2, left] - lin.rows[n // 2, right]) * at.factors.anchors[1]
     _add_narrow(h[n // 2][None], np.outer(align, align)[None], nv)
-    return h
+    return np.asarray(h)
 
 
 def _add_narrow(h: Array, h3: Array, nv: int) -> None:
@@ -103,8 +104,12 @@ def _eliminate(lin: Linearisation, gram: Array, k: int) -> Array:
 def _add_joints(h: Array, lin: Linearisation, gram: Array) -> None:
     """Add what elimination leaves: a matrix of the joint at i - 1, i, i + 1 and T."""
     nv, joint = lin.problem.nv, lin.problem.motors
-    local = np.stack([lin.local(c)[:, joint] for c in JOINT_CHANNELS[N_TORQUES:]])
-    small = np.einsum("cnjb,cdnj,dnje->njbe", local, gram, local, optimize=True)
+    used = [c for c in range(len(gram)) if np.any(gram[c, c])]
+    if not used:
+        return
+    local = np.stack([lin.local(JOINT_CHANNELS[N_TORQUES + c])[:, joint] for c in used], axis=2)
+    half = np.moveaxis(gram[np.ix_(used, used)], (0, 1), (2, 3)) @ local
+    small = np.swapaxes(local, 2, 3) @ half
     at = [b * nv + joint for b in range(3)]
     for b in range(3):
         for c in range(3):

@@ -83,6 +83,7 @@ class Linearisation:
         self.chain = Chain(problem, ev, d, problem.stack.sensors)
         self.partials = problem.stack.first(ev.motion)
         self.log_scale = np.array([-0.5 / ev.x[-2], 0.5 / ev.x[-1]])
+        self._local: dict[str, Array] = {}
         self.is_period_out = float(ev.anchors[2] != 0)
 
     def at(self, w: Array, penalty: float) -> Weighted:
@@ -100,6 +101,8 @@ class Linearisation:
         Returns:
             Shape (N, nv, 4).
         """
+        if channel in self._local:
+            return self._local[channel]
         m = self.evaluation.motion
         h, n = m.h, len(m.q)
         by_knot, by_period = {
@@ -111,6 +114,7 @@ class Linearisation:
         }[channel]
         out = np.empty((*m.q.shape, 4))
         out[..., :3], out[..., 3] = by_knot, by_period
+        self._local[channel] = out
         return out
 
 
