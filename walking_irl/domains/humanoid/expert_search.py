@@ -21,12 +21,12 @@ from walking_irl.domains.humanoid.learner import (
     check_weights,
     known_gaits,
     polish,
-    run_tasks,
     solver_for,
 )
 from walking_irl.domains.humanoid.optimiser.solver import Solution
 from walking_irl.domains.humanoid.optimiser.stages import Stage, stage
 from walking_irl.domains.humanoid.spec import WalkerSpec
+from walking_irl.workers import run_tasks
 
 SEARCH_PENALTY = 1e4
 """Root penalty at which basins are compared: soft, so that a gait can still change its kind."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from concurrent.futures import Executor
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from walking_irl.arrays import Array
+from walking_irl.domains.contract import OnStep
 from walking_irl.domains.humanoid.body.load import SHIPPED
 from walking_irl.domains.humanoid.costs.defaults import DEFAULT_COSTS
 from walking_irl.domains.humanoid.gait.gait import Gait
@@ -18,8 +19,10 @@ from walking_irl.domains.humanoid.optimiser.solver import SMOOTH_DECREMENT, Gait
 from walking_irl.domains.humanoid.optimiser.stages import DIRECT, LADDER, Stage
 from walking_irl.domains.humanoid.optimiser.transcription import Transcription
 from walking_irl.domains.humanoid.spec import HUMANOID, WalkerSpec
-from walking_irl.errors import InvalidInputError, SolverError
+from walking_irl.domains.weights import normalised
+from walking_irl.errors import SolverError
 from walking_irl.types import Response
+from walking_irl.workers import run_tasks
 
 NUDGE = np.deg2rad(0.005)
 """Learners start this far from the demonstration, so as not to sit on its contact jump."""
@@ -59,14 +62,7 @@ def check_weights(w: Array, spec: WalkerSpec = HUMANOID) -> Array:
     Raises:
         InvalidInputError: If they have another shape, or are negative, not finite or all zero.
     """
-    w = np.asarray(w, dtype=float)
-    names = [c.name for c in spec.stack.per_metre]
-    if w.shape != (len(names),):
-        raise InvalidInputError(f"expected {len(names)} weights ({', '.join(names)}), got {w.size}")
-    if not np.isfinite(w).all() or (w < 0).any() or not w.any():
-        raise InvalidInputError(f"weights must be finite, >= 0 and not all zero, got {w.tolist()}")
-    w = w / w.max()  # against overflow
-    return np.asarray(w / w.sum())
+    return normalised(w, spec.stack.objectives)
 
 
 def polish(spec: WalkerSpec, w: Array, x: Array, stages: Sequence[Stage]) -> Solution:
@@ -113,13 +109,6 @@ def search(
     return respond(solver_for(spec), w, solutions[0], solutions[1:])
 
 
-def run_tasks(function: Any, tasks: Sequence[tuple[Any, ...]], executor: Executor | None) -> Any:
-    """Results of ``function(*task)`` in order, side by side where there is an executor."""
-    if executor is None:
-        return [function(*task) for task in tasks]
-    return [f.result() for f in [executor.submit(function, *task) for task in tasks]]
-
-
 class WarmStartSolver:
     """The learner's forward solver: it sees a demonstrated gait and starts from there.
 
@@ -139,7 +128,7 @@ class WarmStartSolver:
         demonstration: Gait,
         spec: WalkerSpec = HUMANOID,
         threads: int = 1,
-        on_step: Callable[[int, float], None] | None = None,
+        on_step: OnStep | None = None,
     ) -> None:
         self.spec, self.threads, self.on_step = spec, threads, on_step
         self.start = demonstration.to_vector()
@@ -148,7 +137,7 @@ class WarmStartSolver:
         self.found: list[Start] = []
 
     def __getstate__(self) -> dict[str, Any]:
-        """One thread in another process: a pool already uses the cores."""
+        """One thread in another process, unseen: a pool already uses the cores."""
         return {**self.__dict__, "threads": 1, "on_step": None}
 
     def __call__(self, w: Array) -> Response:

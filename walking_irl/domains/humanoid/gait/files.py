@@ -8,9 +8,7 @@ from __future__ import annotations
 
 import csv
 import io
-import zlib
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 
@@ -19,7 +17,7 @@ from walking_irl.domains.humanoid.body.anatomy import Walker
 from walking_irl.domains.humanoid.gait.cycles import drifting_spline, mirror_average
 from walking_irl.domains.humanoid.gait.gait import Gait, whole_cycle
 from walking_irl.errors import InvalidInputError
-from walking_irl.files import write_file
+from walking_irl.files import UNREADABLE, write_arrays, write_file
 
 N_KNOTS = 40
 LEAST_STEP = 0.05  # [m]
@@ -40,9 +38,7 @@ def save_gait(path: Path, gait: Gait, walker: Walker) -> None:
     }
     _check_ending(path)
     if path.suffix == ".npz":
-        packed = io.BytesIO()
-        np.savez_compressed(packed, **columns)
-        write_file(path, packed.getvalue())
+        write_arrays(path, columns)
     else:
         text = io.StringIO(newline="")
         writer = csv.writer(text)
@@ -104,21 +100,6 @@ def _resample(q: Array, n: int, stride: float | None = None) -> Array:
     drift = np.zeros(q.shape[1])
     drift[0] = stride
     return drifting_spline(q, 1.0, drift)(np.arange(n) / n)[0]
-
-
-UNREADABLE = (
-    OSError,
-    ValueError,
-    EOFError,
-    TypeError,
-    AttributeError,
-    KeyError,
-    NotImplementedError,
-    BadZipFile,
-    csv.Error,
-    zlib.error,
-)
-"""What NumPy and csv raise on files that they cannot read; an .npy named .npz is one of them."""
 
 
 def _check_ending(path: Path) -> None:
