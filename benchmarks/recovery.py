@@ -24,8 +24,8 @@ from walking_irl.domains.humanoid import domain as domain_module
 from walking_irl.domains.humanoid.closed_loop.trials import measure
 from walking_irl.domains.humanoid.domain import Humanoid, exact_expert
 from walking_irl.domains.humanoid.gait.library import load_library
-from walking_irl.domains.humanoid.optimiser import solver as gait_solver
-from walking_irl.domains.humanoid.optimiser.linearisation import Linearisation
+from walking_irl.domains.humanoid.optimiser import descent
+from walking_irl.domains.humanoid.optimiser.linearisation import Linearisation, Weighted
 from walking_irl.domains.humanoid.optimiser.normal_equations import Factor, NormalMatrix
 from walking_irl.domains.humanoid.optimiser.transcription import Transcription
 from walking_irl.run.session import PROBE
@@ -80,12 +80,12 @@ def timers(clock: Clock) -> Iterator[None]:
     """Wrap the parts of the gait solver."""
     wrapped: list[tuple[Any, str, str]] = [
         (Transcription, "_over_knots", DERIVATIVES),
-        (gait_solver, "normal_matrix", ALGEBRA),
+        (descent, "normal_matrix", ALGEBRA),
         (NormalMatrix, "factor", ALGEBRA),
         (Factor, "solve", ALGEBRA),
         (Linearisation, "__init__", ALGEBRA),
-        (Linearisation, "times", ALGEBRA),
-        (Linearisation, "transpose_times", ALGEBRA),
+        (Weighted, "times", ALGEBRA),
+        (Weighted, "transpose_times", ALGEBRA),
     ]
     patches = [mock.patch.object(o, n, clock.wrap(p, getattr(o, n))) for o, n, p in wrapped]
     for patch in patches:
@@ -108,8 +108,8 @@ def make_expert(clock: Clock, domain: Humanoid, rollouts: int, seed: int) -> Exp
 
 def shipped_expert(domain: Humanoid) -> Expert:
     """An exact expert that walks the shipped reference gait."""
-    shipped = load_library(domain.planar)["reference"]
-    return exact_expert(shipped.gait, shipped.folded)
+    shipped = load_library(domain.spec.body)["reference"]
+    return exact_expert(shipped.gait, shipped.total_costs)
 
 
 def recover(
@@ -160,7 +160,7 @@ def main() -> None:
         "--quick", action="store_true", help="planar, the shipped gait as expert, two solves"
     )
     args = parser.parse_args()
-    domain = Humanoid(args.planar or args.quick)
+    domain = Humanoid("humanoid-planar" if args.planar or args.quick else "humanoid")
     rollouts = 0 if args.quick else args.rollouts
     expert_clock, clock = Clock(), Clock()
     if args.quick:

@@ -32,7 +32,7 @@ def main() -> None:
     parser.add_argument("--planar", action="store_true", help="a smaller body, in a plane")
     args = parser.parse_args()
 
-    domain = Humanoid(planar=args.planar)
+    domain = Humanoid("humanoid-planar" if args.planar else "humanoid")
     options = {"rollouts": 20, "noise": 0.02}
     rng = np.random.default_rng(args.seed)
     with workers() as executor:

@@ -50,7 +50,7 @@ def planar():
     """The planar body."""
     from walking_irl.domains.humanoid.domain import Humanoid
 
-    return Humanoid(planar=True).walker
+    return Humanoid("humanoid-planar").walker
 
 
 @pytest.fixture(scope="session")
@@ -62,7 +62,7 @@ def demonstration(tmp_path_factory, planar):
     from walking_irl.domains.humanoid.gait.library import load_gaits
 
     path = tmp_path_factory.mktemp("gait") / "gait.npz"
-    save_gait(path, load_gaits(planar=True)["reference"], planar)
+    save_gait(path, load_gaits("humanoid-planar")["reference"], planar)
     with np.load(path) as data:
         return path, {name: data[name] for name in data.files}
 

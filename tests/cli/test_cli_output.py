@@ -11,7 +11,7 @@ from sentences import RECOVER_KEYS
 
 from walking_irl import __version__
 from walking_irl.cli.main import COMMANDS
-from walking_irl.domains.humanoid.costs.objectives import REFERENCE_WEIGHTS
+from walking_irl.domains.humanoid.costs.defaults import REFERENCE_WEIGHTS
 from walking_irl.domains.humanoid.gait.files import load_gait
 from walking_irl.domains.humanoid.gait.gait import whole_cycle
 from walking_irl.recording.reader import inspect_recording

@@ -18,7 +18,7 @@ MAKERS = {
     "driving": Driving,
     "lqr": lambda: LQR(3),
     "walking-path": lambda: WalkingPath([(3.0, 2.0, 90.0), (1.5, -2.5, -90.0)], n_intervals=12),
-    "humanoid-planar": lambda: Humanoid(planar=True),
+    "humanoid-planar": lambda: Humanoid("humanoid-planar"),
 }
 WALKER = pytest.param("humanoid-planar", marks=pytest.mark.slow)
 

@@ -16,7 +16,7 @@ from recordings import (
 )
 
 from walking_irl.arrays import Array
-from walking_irl.domains.humanoid.body.anatomy import load_walker
+from walking_irl.domains.humanoid.body.load import load_walker
 from walking_irl.domains.humanoid.gait.gait import Gait, cycle_motion
 from walking_irl.errors import InvalidInputError
 from walking_irl.files import model_path

@@ -35,24 +35,24 @@ class Entry(NamedTuple):
     """The domain's own, for ``--help``."""
 
 
-def _humanoid(planar: bool) -> Callable[..., Domain]:
-    def make() -> Domain:
+def _humanoid(body: str) -> Callable[..., Domain]:
+    def make(**options: Any) -> Domain:
         from walking_irl.domains.humanoid.domain import Humanoid
 
-        return Humanoid(planar)
+        return Humanoid(**{"body": body, **options})
 
     return make
 
 
 DOMAINS: dict[str, Entry] = {
     "humanoid": Entry(
-        _humanoid(False),
+        _humanoid("humanoid"),
         "3-D walker, 25 joints",
         "trajectory optimisation by inverse dynamics",
         HUMANOID_OPTIONS,
     ),
     "humanoid-planar": Entry(
-        _humanoid(True),
+        _humanoid("humanoid-planar"),
         "planar walker, 14 joints",
         "trajectory optimisation by inverse dynamics",
         HUMANOID_OPTIONS,
