@@ -198,7 +198,7 @@ def humanoid() -> Setting:
 
         def shaken() -> Array:
             starts = [solver.shake(x, SHAKE, rng) for _ in range(LIBRARY)]
-            return -np.array([solver.problem.evaluate(v).folded() for v in starts])
+            return -np.array([solver.problem.evaluate(v).total_costs() for v in starts])
 
         sources: dict[str, Source] = {
             "iterates": lambda answer: answer.evaluated,

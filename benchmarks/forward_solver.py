@@ -93,14 +93,15 @@ def dense_iteration(query: Query, iterations: int) -> float:
     dense = 0.0
 
     def residual(x: Array) -> Array:
-        return weighted(problem.evaluate(x.ravel()), w, ROOT_PENALTY).flat()[:, None]
+        ev = problem.evaluate(x.ravel())
+        return weighted(problem.stack, ev, w, ROOT_PENALTY).flat()[:, None]
 
     def jacobian(x: Array, r: Array) -> Array:
         nonlocal dense
-        lin = solver.linearise(x.ravel())
+        at = solver.linearise(x.ravel()).at(w, ROOT_PENALTY)
         start = time.process_time()
         unit = np.eye(x.size)
-        J = np.column_stack([lin.times(e, w, ROOT_PENALTY).flat() for e in unit])
+        J = np.column_stack([at.times(e).flat() for e in unit])
         dense += time.process_time() - start
         return J
 

@@ -21,7 +21,7 @@ from scipy.interpolate import CubicSpline
 
 from walking_irl.arrays import Array
 from walking_irl.domains.humanoid.body.anatomy import Walker, load_walker
-from walking_irl.domains.humanoid.costs.objectives import OBJECTIVES, REFERENCE_WEIGHTS
+from walking_irl.domains.humanoid.costs.defaults import OBJECTIVES, REFERENCE_WEIGHTS
 from walking_irl.domains.humanoid.gait.gait import Gait
 from walking_irl.domains.humanoid.learner import polish, solver_for
 from walking_irl.domains.humanoid.optimiser.solver import stage
@@ -139,7 +139,9 @@ def make(planar: bool, start: Array, pool: ProcessPoolExecutor) -> dict[str, Arr
         f"{body}_name": np.array(list(weights)),
         f"{body}_w": np.array(list(weights.values())),
         f"{body}_x": np.array([found[name] for name in weights]),
-        f"{body}_folded": np.array([problem.evaluate(found[name]).folded() for name in weights]),
+        f"{body}_folded": np.array(
+            [problem.evaluate(found[name]).total_costs() for name in weights]
+        ),
     }
 
 
@@ -148,7 +150,7 @@ def exchange(planar: bool, w: Array, gaits: Collection[Array], pool: ProcessPool
     problem = solver_for(planar).problem
 
     def cost(x: Array) -> float:
-        return float(w @ problem.evaluate(x).folded())
+        return float(w @ problem.evaluate(x).total_costs())
 
     near = sorted(gaits, key=cost)[:4]
     jobs = [pool.submit(polish, planar, w, x, SEARCH + FINISH) for x in near]
@@ -161,7 +163,7 @@ def report(planar: bool, name: str, w: Array, x: Array) -> None:
     solver = solver_for(planar)
     lin = solver.linearise(x)
     print(
-        f"{name:14s} J {w @ lin.evaluation.folded():.5f} "
+        f"{name:14s} J {w @ lin.evaluation.total_costs():.5f} "
         f"decrement {solver.decrement(w, lin):.0e} speed {x[-2] / x[-1]:.2f} m/s",
         flush=True,
     )

@@ -16,7 +16,7 @@ from walking_irl import __version__, experiments
 from walking_irl.cli import recover
 from walking_irl.cli.main import main
 from walking_irl.cli.view import SCREENS
-from walking_irl.domains.humanoid.costs.objectives import REFERENCE_WEIGHTS
+from walking_irl.domains.humanoid.costs.defaults import REFERENCE_WEIGHTS
 from walking_irl.domains.humanoid.domain import Humanoid
 from walking_irl.domains.humanoid.gait.files import load_gait, save_gait
 from walking_irl.domains.humanoid.gait.gait import whole_cycle

@@ -91,4 +91,4 @@ def _folded(domain: Humanoid, gait: Gait, path: Path) -> np.ndarray:
             f"{path} is not a walk of this body: its root would need {worst:.2g} body weights of "
             f"external force (at most {PHYSICAL}); give a gait saved by walking-irl gait --save"
         )
-    return evaluation.folded()
+    return evaluation.total_costs()

@@ -9,7 +9,7 @@ from walking_irl.domains.humanoid.body.anatomy import load_walker
 from walking_irl.domains.humanoid.closed_loop.environment import Push
 from walking_irl.domains.humanoid.closed_loop.policy import TrackingPolicy, tracking_policy
 from walking_irl.domains.humanoid.closed_loop.rollout import averaged_gait, rollout
-from walking_irl.domains.humanoid.costs.objectives import folded_costs
+from walking_irl.domains.humanoid.costs.stack import cost_stack
 from walking_irl.domains.humanoid.gait.gait import Gait
 from walking_irl.domains.humanoid.gait.library import load_gaits, load_library
 from walking_irl.errors import FallError, InvalidInputError
@@ -46,7 +46,7 @@ def test_simulated_walk_has_the_objectives_of_its_gait(planar):
     walker, shipped = load_walker(planar), load_library(planar)["reference"]
     policy = tracking_policy(walker, shipped.gait)
     walk = rollout(walker, policy, cycles=7)
-    simulated = folded_costs(walker, settled(walk, policy, 2, 5), policy.timestep)
+    simulated = cost_stack(walker).rollout_costs(settled(walk, policy, 2, 5), policy.timestep)
     np.testing.assert_allclose(simulated, shipped.folded, rtol=1e-3)
 
 

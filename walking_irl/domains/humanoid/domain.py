@@ -12,7 +12,7 @@ from walking_irl.domains.humanoid.body.anatomy import Walker, load_walker
 from walking_irl.domains.humanoid.closed_loop.policy import tracking_policy
 from walking_irl.domains.humanoid.closed_loop.rollout import averaged_gait
 from walking_irl.domains.humanoid.closed_loop.trials import MANY, Measurement, Protocol, measure
-from walking_irl.domains.humanoid.costs.objectives import OBJECTIVES
+from walking_irl.domains.humanoid.costs.defaults import OBJECTIVES
 from walking_irl.domains.humanoid.expert_search import OptimalGait, best_gait
 from walking_irl.domains.humanoid.gait.gait import Gait
 from walking_irl.domains.humanoid.learner import Imitator, search, solver_for

@@ -11,7 +11,7 @@ import numpy as np
 
 from walking_irl.arrays import Array
 from walking_irl.domains.humanoid.body.anatomy import load_walker
-from walking_irl.domains.humanoid.costs.objectives import OBJECTIVES
+from walking_irl.domains.humanoid.costs.defaults import OBJECTIVES
 from walking_irl.domains.humanoid.gait.gait import Gait
 from walking_irl.domains.humanoid.gait.library import load_library
 from walking_irl.domains.humanoid.optimiser.solver import (
@@ -124,7 +124,7 @@ class Imitator:
         self.planar, self.threads = planar, threads
         self.start = demonstration.to_vector()
         solver = solver_for(planar, threads)
-        self.demonstrated = solver.problem.evaluate(self.start).folded()
+        self.demonstrated = solver.problem.evaluate(self.start).total_costs()
         self.archive: list[tuple[Array, Array]] = []
 
     def __getstate__(self) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from walking_irl.arrays import Array
-from walking_irl.domains.humanoid.costs.objectives import REFERENCE_WEIGHTS
+from walking_irl.domains.humanoid.costs.defaults import REFERENCE_WEIGHTS
 
 SPREAD = 0.5
 """Standard deviation of the log-weights of a typical walker."""

@@ -9,10 +9,11 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from walking_irl.arrays import Array
 from walking_irl.files import model_path
@@ -69,6 +70,19 @@ class Walker:
     sensor: Mapping[str, slice]
     sensor_mirror: Array
     sensor_advance: Array
+
+    @property
+    def is_lateral(self) -> bool:
+        """Whether it can leave the sagittal plane."""
+        return "root_y" in self.joints
+
+    @cached_property
+    def reads_position(self) -> NDArray[np.bool_]:
+        """Whether a sensor's number is a coordinate of a point in the world, shape (ns,)."""
+        return np.repeat(
+            [_stem(name) in POSITION_SENSORS for name in self.sensor],
+            [rows.stop - rows.start for rows in self.sensor.values()],
+        )
 
     @property
     def torque_mirror(self) -> Array:
@@ -151,9 +165,14 @@ def _sensor_mirror(sensor: Mapping[str, slice]) -> Array:
 def _sensor_advance(sensor: Mapping[str, slice]) -> Array:
     advance = np.zeros(_size(sensor))
     for name, rows in sensor.items():
-        if name.removesuffix("_r").removesuffix("_l") in POSITION_SENSORS:
+        if _stem(name) in POSITION_SENSORS:
             advance[rows.start] = 1
     return advance
+
+
+def _stem(name: str) -> str:
+    """Name without its side."""
+    return name.removesuffix("_r").removesuffix("_l")
 
 
 def _size(sensor: Mapping[str, slice]) -> int:

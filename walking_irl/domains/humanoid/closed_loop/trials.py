@@ -13,7 +13,7 @@ from walking_irl.arrays import Array
 from walking_irl.domains.humanoid.body.anatomy import load_walker
 from walking_irl.domains.humanoid.closed_loop.policy import tracking_policy
 from walking_irl.domains.humanoid.closed_loop.rollout import rollout
-from walking_irl.domains.humanoid.costs.objectives import folded_costs
+from walking_irl.domains.humanoid.costs.stack import cost_stack
 from walking_irl.domains.humanoid.gait.gait import Gait
 from walking_irl.domains.humanoid.learner import run_tasks
 from walking_irl.errors import InvalidInputError
@@ -108,7 +108,7 @@ def walk(
 ) -> tuple[list[Rollout], Array]:
     """Trajectories of one gait, one per seed, and their mean folded costs per cycle, (n, 6)."""
     walker = load_walker(planar)
-    policy = tracking_policy(walker, gait)
+    policy, stack = tracking_policy(walker, gait), cost_stack(walker)
     is_kicked = protocol.disturbance == "kicks"
     walks, costs = [], []
     for seed in seeds:
@@ -123,7 +123,7 @@ def walk(
         walks.append(walked)
         steps = policy.steps_per_cycle
         cycles = [
-            folded_costs(walker, part(walked, c * steps, (c + 1) * steps + 1), policy.timestep)
+            stack.rollout_costs(part(walked, c * steps, (c + 1) * steps + 1), policy.timestep)
             for c in range(protocol.skip, protocol.skip + protocol.cycles)
         ]
         costs.append(np.mean(cycles, axis=0))

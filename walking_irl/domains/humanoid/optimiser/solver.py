@@ -19,14 +19,9 @@ from typing import NamedTuple
 import numpy as np
 
 from walking_irl.arrays import Array
-from walking_irl.domains.humanoid.costs.objectives import OBJECTIVES
-from walking_irl.domains.humanoid.optimiser.linearisation import (
-    Linearisation,
-    Terms,
-    Windows,
-    weighted,
-)
-from walking_irl.domains.humanoid.optimiser.normal_equations import Factor, Fold, normal_matrix
+from walking_irl.domains.humanoid.optimiser.linearisation import Linearisation, Weighted, weighted
+from walking_irl.domains.humanoid.optimiser.normal_equations import Factor, normal_matrix
+from walking_irl.domains.humanoid.optimiser.ring import KnotOrder
 from walking_irl.domains.humanoid.optimiser.transcription import (
     ROOT_PENALTY,
     Evaluation,
@@ -104,8 +99,7 @@ class GaitSolver:
     def __init__(self, problem: Transcription) -> None:
         self.problem = problem
         self.watch: Callable[[int, float], None] | None = None
-        windows = Windows(problem.n_knots, problem.walker.mirror)
-        self.fold = Fold(problem.n_knots, problem.nv, windows)
+        self.order = KnotOrder(problem.n_knots, problem.nv)
 
     def solve(self, w: Array, x: Array, stages: Sequence[Stage] = DIRECT) -> Solution:
         """Best gait for weights ``w`` near the gait ``x``.
@@ -127,7 +121,7 @@ class GaitSolver:
             x, n, stalled = run.minimise(x, passed)
             iterations += n
         ev = self.problem.evaluate(x)
-        return Solution(x, ev.folded(), np.array(passed), iterations, stalled)
+        return Solution(x, ev.total_costs(), np.array(passed), iterations, stalled)
 
     def linearise(self, x: Array, eps: float = FD_STEPS[0]) -> Linearisation:
         """Derivatives at the gait ``x``."""
@@ -139,7 +133,7 @@ class GaitSolver:
         Below 1e-8 the gait is a smooth minimum; above 1e-5 it sits on a contact jump, where
         derivatives and sensitivities mean nothing.
         """
-        g = lin.gradient(w, ROOT_PENALTY)
+        g = lin.at(w, ROOT_PENALTY).gradient
         step = self._undamped(w, lin).solve(g)
         return float(g @ step / lin.evaluation.total(w, ROOT_PENALTY))
 
@@ -150,14 +144,14 @@ class GaitSolver:
             d mu / d w = :math:`g^T (2 J^T J)^{-1} g`, symmetric positive semi-definite, shape
             (6, 6), with g the gradients of the six folded costs; and dx / dw, (N nv + 2, 6).
         """
-        unit = np.eye(len(OBJECTIVES))
-        g = np.column_stack([2 * lin.gradient(e, ROOT_PENALTY) for e in unit])
+        unit = np.eye(len(self.problem.stack.objectives))
+        g = np.column_stack([2 * lin.at(e, ROOT_PENALTY).gradient for e in unit])
         y = self._undamped(w, lin).solve(g) / 2
         m = g.T @ y
         return (m + m.T) / 2, -y
 
     def _undamped(self, w: Array, lin: Linearisation) -> Factor:
-        return normal_matrix(lin, self.fold, w, ROOT_PENALTY).factor(1e-9)
+        return normal_matrix(lin.at(w, ROOT_PENALTY), self.order).factor(1e-9)
 
     def shake(self, x: Array, amplitude: float, rng: np.random.Generator) -> Array:
         """Smooth random change of the joint angles that keeps the mirror symmetry.
@@ -216,7 +210,7 @@ class _Descent:
             if self.solver.watch is not None:
                 self.solver.watch(iteration, 2 * found.cost)
             if is_step:
-                passed.append(found.ev.folded())
+                passed.append(found.ev.total_costs())
                 self.failures = 0
                 self.small = self.small + 1 if decrease < self.stage.tol else 0
             at = found
@@ -244,11 +238,9 @@ class _Descent:
     def step(self, at: _State) -> tuple[_State, float, bool]:
         """One iteration: the next state, its relative decrease, and whether a step was found."""
         lin = self.solver.linearise(at.ev.x, FD_STEPS[self.fd])
-        w, penalty = self.w, self.stage.penalty
-        normal = normal_matrix(lin, self.solver.fold, w, penalty)
-        r = weighted(at.ev, w, penalty)
-        pull = self.tether * (at.ev.x - self.anchor)
-        g = lin.transpose_times(r, w, penalty) + pull
+        here = lin.at(self.w, self.stage.penalty)
+        normal = normal_matrix(here, self.solver.order)
+        g = here.gradient + self.tether * (at.ev.x - self.anchor)
         uphill: _State | None = None
         decrement = np.nan
         for _ in range(15):
@@ -262,8 +254,8 @@ class _Descent:
             if abs(dx[-1]) > MAX_PERIOD_STEP:
                 self.damping = max(5 * self.damping, 1e-8)
                 continue
-            jdx = lin.times(dx, w, penalty).flat()
-            bend, ratio = self.acceleration(lin, factor, at, r, dx, jdx)
+            jdx = here.times(dx).flat()
+            bend, ratio = self.acceleration(here, factor, dx, jdx)
             if ratio > 3:
                 self.damping = max(3 * self.damping, 1e-8)
                 continue
@@ -280,13 +272,13 @@ class _Descent:
         return self.stuck(at, uphill, decrement)
 
     def acceleration(
-        self, lin: Linearisation, factor: Factor, at: _State, r: Terms, dx: Array, jdx: Array
+        self, here: Weighted, factor: Factor, dx: Array, jdx: Array
     ) -> tuple[Array, float]:
         """Second-order correction of a step and its size relative to the step."""
-        w, penalty = self.w, self.stage.penalty
-        ahead = weighted(self.problem.evaluate(at.ev.x + PROBE * dx), w, penalty).flat()
+        r, ev = here.residuals, self.problem.evaluate(here.lin.evaluation.x + PROBE * dx)
+        ahead = weighted(self.problem.stack, ev, self.w, self.stage.penalty).flat()
         curvature = 2 / PROBE * ((ahead - r.flat()) / PROBE - jdx)
-        bend = -factor.solve(lin.transpose_times(r.like(curvature), w, penalty))
+        bend = -factor.solve(here.transpose_times(r.like(curvature)))
         return bend, float(2 * np.linalg.norm(bend) / np.linalg.norm(dx))
 
     def adapt(self, actual: float, predicted: float) -> None:
