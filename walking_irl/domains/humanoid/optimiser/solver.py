@@ -20,8 +20,8 @@ import numpy as np
 
 from walking_irl.arrays import Array
 from walking_irl.domains.humanoid.optimiser.linearisation import Linearisation, Weighted, weighted
-from walking_irl.domains.humanoid.optimiser.normal_equations import Factor, normal_matrix
-from walking_irl.domains.humanoid.optimiser.ring import KnotOrder
+from walking_irl.domains.humanoid.optimiser.hessian import Structure, half_hessian
+from walking_irl.domains.humanoid.optimiser.ring import Factor
 from walking_irl.domains.humanoid.optimiser.transcription import (
     ROOT_PENALTY,
     Evaluation,

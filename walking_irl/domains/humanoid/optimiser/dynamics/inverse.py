@@ -12,7 +12,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from walking_irl.arrays import Array
+from walking_irl.arrays import Array, Flags
 from walking_irl.domains.humanoid.optimiser.dynamics.contact import Contact, Soles
 from walking_irl.domains.humanoid.optimiser.dynamics.coverage import (
     UncoveredError,
@@ -84,6 +84,17 @@ class InverseDynamics:
         except UncoveredError as e:
             self.reason = str(e)
         self._armature = np.array(model.dof_armature)
+
+    @property
+    def static_sensors(self) -> Flags:
+        """Which sensors are known to depend on positions alone, shape (ns,)."""
+        out = np.zeros(self.model.nsensordata, dtype=bool)
+        if self._parts is not None:
+            plan = self._parts.plan
+            starts = [part.start for part in plan.points + plan.axes] + list(plan.centres)
+            for start in starts:
+                out[start : start + 3] = True
+        return out
 
     def at(self, q: Array, v: Array, a: Array) -> Derivatives:
         """Derivatives at positions, velocities and accelerations, each of shape (N, nv)."""
