@@ -3,6 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
+from walking_irl.domains.humanoid.optimiser.normal_equations import normal_matrix
 
 from walking_irl.domains.humanoid.body.anatomy import load_walker
 from walking_irl.domains.humanoid.costs.defaults import OBJECTIVES, REFERENCE_WEIGHTS
@@ -10,7 +11,6 @@ from walking_irl.domains.humanoid.gait.gait import Gait, cycle_motion
 from walking_irl.domains.humanoid.gait.library import load_library
 from walking_irl.domains.humanoid.learner import check_weights, solver_for
 from walking_irl.domains.humanoid.optimiser.linearisation import Linearisation, weighted
-from walking_irl.domains.humanoid.optimiser.normal_equations import normal_matrix
 from walking_irl.domains.humanoid.optimiser.solver import DIRECT, stage
 from walking_irl.domains.humanoid.optimiser.transcription import ROOT_PENALTY
 from walking_irl.errors import InvalidInputError

@@ -142,15 +142,15 @@ class Humanoid:
         optimum = best_gait(self.planar, w_E, search_rng, executor)
         spoilt = self._spoilt(w_E, optimum, shake_rng)
         gait = Gait.from_vector(spoilt.x, len(self.walker.joints))
-        expert = replace(exact_expert(gait, spoilt.folded), suboptimality=0.0)
+        expert = replace(exact_expert(gait, spoilt.total_costs), suboptimality=0.0)
         return Demonstration(expert, gait, optimum, ())
 
     def _spoilt(self, w_E: Array, optimum: OptimalGait, rng: np.random.Generator) -> Solution:
         solver, amplitude, best = solver_for(self.planar), SPOILT_BY, float(optimum.folded @ w_E)
         for _ in range(SPOILING):
-            start = solver.shake(optimum.x, amplitude, rng)
+            start = solver.perturb(optimum.x, amplitude, rng)
             spoilt = solver.solve(w_E, start, TO_PHYSICS)
-            worse = float(spoilt.folded @ w_E) / best - 1.0
+            worse = float(spoilt.total_costs @ w_E) / best - 1.0
             if WORSE[0] <= worse <= WORSE[1]:
                 return spoilt
             amplitude *= 0.7 if worse > WORSE[1] else 1.3
@@ -158,7 +158,7 @@ class Humanoid:
 
     def learner(self, expert: Expert, threads: int = 1) -> Imitator:
         """The learner's forward solver: it starts from the demonstrated gait."""
-        return Imitator(expert.demonstration, self.planar, threads)
+        return Imitator(expert.demonstration, self.planar, threads, expert.mu)
 
     def pack(self, policy: Gait) -> Array:
         """A gait as one array, for files."""

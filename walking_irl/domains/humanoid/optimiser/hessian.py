@@ -1,9 +1,9 @@
 r"""Half the Hessian of w.G: exact, or Gauss-Newton's.
 
 The half cost is a function of the outputs of every knot (root forces, torques, sensors), of its
-coordinates u = (q, v, a), of h and L. With Y the outputs' derivatives by u, C the second derivatives
-of the cost by slots (:mod:`~.pairs`), and the multipliers (first derivatives) of torques and
-sensors, every knot contributes
+coordinates u = (q, v, a), of h and L. With Y the outputs' derivatives by u, C the cost's second
+derivatives by slots (:mod:`~.pairs`), and lambda the multipliers (its first derivatives) of the
+outputs, every knot contributes
 
 .. math:: K = Y^T C_{yy} Y + Y^T C_{yu} + C_{uy} Y + C_{uu} + \sum_y \lambda_y \nabla^2 y
 

@@ -92,9 +92,8 @@ class Pairs:
         self.dynamic = np.flatnonzero(~knots.is_static)
         self.static = np.flatnonzero(knots.is_static)
         found = [self._of_place(*t) for t in self._terms()]
-        empty = [np.zeros(0, int)] * 7 + [np.zeros(0)]
-        columns = [np.concatenate([e, *x]) for e, x in zip(empty, zip(*found), strict=True)]
-        self._layout(*columns)
+        none = [np.zeros(0, int)] * 7 + [np.zeros(0)]
+        self._layout(*(np.concatenate(x) for x in zip(none, *found, strict=True)))
 
     def _terms(self) -> list[tuple[int, tuple[Read, ...], int]]:
         """Of each term with reads: the offset of its numbers, its reads, its number of residuals.

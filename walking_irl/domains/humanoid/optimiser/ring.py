@@ -60,8 +60,12 @@ class BorderedMatrix(NamedTuple):
 
     def blend(self, other: BorderedMatrix, share: float) -> BorderedMatrix:
         """This matrix plus ``share`` of the difference to another."""
-        parts = zip(self[:3], other[:3], strict=True)
-        return BorderedMatrix(*(a + share * (b - a) for a, b in parts), self.permutation)
+        return BorderedMatrix(
+            self.band + share * (other.band - self.band),
+            self.border + share * (other.border - self.border),
+            self.corner + share * (other.corner - self.corner),
+            self.permutation,
+        )
 
     def factor(self, damping: float, tether: Array | None = None) -> Factor:
         """Cholesky factor of the matrix plus ``damping`` and ``tether`` on its diagonal.
