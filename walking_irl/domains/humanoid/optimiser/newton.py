@@ -43,6 +43,10 @@ TRIALS = 16
 FAR, DECISIVE, NEAR, LOOSEST = 0.02, 0.05, 1e-4, 1e-7
 """Regrets above FAR end the solve at DECISIVE times the regret, others at NEAR times it, but no
 later than LOOSEST; always relative to the cost."""
+CUTS, IDLE = 1e-3, 0.01
+"""Where the Hessian is indefinite or steps need braking, a step that gains less than IDLE times the
+regret ends the solve: there is no smooth minimum to be had, and the answer cuts already. It does if
+its regret is above CUTS, or what the undamped model promises is small against it."""
 CORRECTIONS = 3
 
 
@@ -79,6 +83,7 @@ class Model:
     Attributes:
         here: Linearisation at weights.
         gradient: Half the gradient, tether included.
+        is_indefinite: Whether a factorisation has failed.
     """
 
     def __init__(
@@ -88,6 +93,7 @@ class Model:
         self.gradient = here.gradient + tether * pull
         covered = here.lin.problem.dynamics.reason is None
         self.shares = list(SHARES) if root is not None and covered else [0.0]
+        self.is_indefinite = False
         self._exact: BorderedMatrix | None = None
         self._gauss: BorderedMatrix | None = None
 
@@ -112,6 +118,7 @@ class Model:
             try:
                 return self.matrix(self.shares[0]).factor(damping, self.tether), damping
             except np.linalg.LinAlgError:
+                self.is_indefinite = True
                 if damping < MOST_DAMPING:
                     damping = max(10 * damping, START_DAMPING)
                 elif len(self.shares) > 1:
@@ -191,6 +198,16 @@ class Newton:
         loose = DECISIVE * regret if regret > FAR else min(LOOSEST, NEAR * regret)
         return max(self.stage.tol, loose)
 
+    def is_decisive(self, at: State, model: Model, step: Step, gain: float, is_small: bool) -> bool:
+        """Whether the answer cuts and more work would not deepen the cut by much."""
+        regret = self.regret(at)
+        if regret > FAR and is_small and gain < self.stop(at):
+            return True
+        is_rough = model.is_indefinite or step.damping > MOST_DAMPING or step.to is None
+        if not (is_rough and gain < IDLE * regret):
+            return False
+        return regret > CUTS or model.decrement() < DECISIVE * regret * at.cost
+
     def run(
         self, at: State, passed: list[Array], watch: Callable[[float], None] | None = None
     ) -> tuple[State, int, Status, float]:
@@ -207,17 +224,16 @@ class Newton:
             decrement, cost = np.nan, at.cost
             if is_small or step.to is None:
                 decrement = model.decrement() / cost
+            gain = 0.0
             if step.to is not None:
                 gain, at = (cost - step.to.cost) / cost, step.to
                 passed.append(at.ev.total_costs())
                 self.root = step.root
-            else:
-                gain = 0.0
             if watch is not None:
                 watch(2 * at.cost)
             if decrement < stop:
                 return at, iteration, Status.CONVERGED, decrement
-            if is_small and gain < stop and step.to is not None and self.regret(at) > FAR:
+            if self.is_decisive(at, model, step, gain, is_small):
                 return at, iteration, Status.DECISIVE, decrement
             hidden = hidden + 1 if is_small else 0
             if step.to is None or hidden > 2:

@@ -145,13 +145,13 @@ class GaitSolver:
     def _escape(self, newton: Newton, best: State, escape: int, rng: np.random.Generator) -> State:
         """Another road from a gait where no step helps."""
         newton.damping = 1e-3
-        if escape == 0:
+        if escape % 2 == 0:
             model = newton.model(best)
             factor, _ = model.factor(UNDAMPED)
             uphill = newton.state(best.ev.x - factor.solve(model.gradient))
             if uphill.cost < best.cost * (1 + JUMP):
                 return uphill
-        if escape <= 1:
+        if escape == 0:
             newton.root = None  # Gauss-Newton's metric for a step
             return best
         return newton.state(self.perturb(best.ev.x, HAIR, rng))
