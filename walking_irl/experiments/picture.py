@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from html import escape
 from itertools import groupby
 
-OURS, RIVAL, FAINT, INK = "#3b6fb6", "#9a9a9a", "#e2e2e2", "#222222"
+OURS, BASELINE, FAINT, INK = "#3b6fb6", "#9a9a9a", "#e2e2e2", "#222222"
 ROW, LABELS, PLOT, RESULT = 20, 250, 420, 90
 """Height of a row; widths of labels, of the plot and of the results beside it [px]."""
 
@@ -36,7 +36,7 @@ def solves_chart(title: str, rows: Sequence[Sequence[str]]) -> str:
         y += ROW + 2
         for _, method, mean, error, success in group:
             n, total = success.split("/")
-            colour = OURS if method.startswith("CPIRL") else RIVAL
+            colour = OURS if method.startswith("CPIRL") else BASELINE
             fill = colour if n == total else "white"
             middle = y + ROW / 2
             body.append(_text(LABELS - 8, middle + 4, method, anchor="end"))

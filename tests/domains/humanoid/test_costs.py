@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from walking_irl.domains.humanoid.body.anatomy import load_walker
+from walking_irl.domains.humanoid.body.load import load_walker
 from walking_irl.domains.humanoid.costs.base import Cost, H, Read, Term, read_joints, read_sensors
 from walking_irl.domains.humanoid.costs.defaults import (
     DEFAULT_COSTS,
@@ -28,7 +28,7 @@ def channels():
     """A gait off every optimum: hinges are open here and closed there."""
     x = load_library()["reference"].gait.to_vector()
     x = x + 1e-2 * np.random.default_rng(0).normal(size=x.size)
-    return solver_for(False).problem.evaluate(x).motion
+    return solver_for().problem.evaluate(x).motion
 
 
 def closed_forms(tau, v, effort, work):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from walking_irl.domains.humanoid.body.anatomy import load_walker
+from walking_irl.domains.humanoid.body.load import load_walker
 from walking_irl.domains.humanoid.closed_loop.environment import (
     Disturbance,
     Push,
@@ -18,7 +18,7 @@ from walking_irl.domains.humanoid.gait.library import load_gaits
 from walking_irl.errors import InvalidInputError
 
 
-@pytest.fixture(scope="module", params=[False, True], ids=["spatial", "planar"])
+@pytest.fixture(scope="module", params=["humanoid", "humanoid-planar"])
 def walking(request):
     walker = load_walker(request.param)
     gait = load_gaits(request.param)["reference"]

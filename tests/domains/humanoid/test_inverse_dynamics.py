@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from walking_irl.domains.humanoid.body.anatomy import load_walker
+from walking_irl.domains.humanoid.body.load import load_walker
 from walking_irl.domains.humanoid.gait.gait import cycle_motion
 from walking_irl.domains.humanoid.gait.library import load_library
 from walking_irl.domains.humanoid.optimiser.dynamics.inverse import (
@@ -39,10 +39,10 @@ def humanlike(model):
 @lru_cache
 def gait_of(variant):
     """Model and motion of half a cycle near, not on, a shipped gait."""
-    planar = variant == "planar"
-    walker = load_walker(planar)
+    body = "humanoid-planar" if variant == "planar" else "humanoid"
+    walker = load_walker(body)
     model = humanlike(walker.model) if variant == "human" else walker.model
-    gait = load_library(planar)["reference"].gait
+    gait = load_library(body)["reference"].gait
     rng = np.random.default_rng(0)
     q, v, a = (x[:N] for x in cycle_motion(gait, walker.mirror))
     q = q + rng.normal(size=q.shape) * 1e-3 * (np.arange(q.shape[1]) >= walker.n_root)

@@ -1,7 +1,7 @@
-"""The expert: the best gait for hidden weights, and what is recorded of it.
+"""The expert: the best gait for ground-truth weights, and what is recorded of it.
 
 Newton's method finds the minimum of a basin at once, so the price is the search for the basin: from
-the shipped gaits that are cheapest under the weights, from the reference, and from hops off the
+the known gaits that are cheapest under the weights, from the reference, and from hops off the
 best, all at a low root penalty; the best basins go to the full one. An optimum that is no smooth
 minimum sits on a contact jump: it is perturbed and solved again.
 """
@@ -15,15 +15,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from walking_irl.arrays import Array
-from walking_irl.domains.humanoid.gait.library import load_library
-from walking_irl.domains.humanoid.learner import check_weights, polish, run_tasks, solver_for
-from walking_irl.domains.humanoid.optimiser.newton import Stage
-from walking_irl.domains.humanoid.optimiser.solver import Solution, stage
+from walking_irl.domains.humanoid.learner import check_weights, known_gaits, polish, solver_for
+from walking_irl.domains.humanoid.optimiser.solver import Solution
+from walking_irl.domains.humanoid.optimiser.stages import Stage, stage
+from walking_irl.domains.humanoid.spec import WalkerSpec
+from walking_irl.workers import run_tasks
 
 APPROACH = (stage(1e4, 25, 1e-5),)
 FINISH = (stage(1e6, 60, 1e-11),)
 NEAREST = 5
-"""Shipped gaits from which a search starts, the cheapest under the weights."""
+"""Known gaits from which a search starts, the cheapest under the weights."""
 HOPS = 2
 HOP = np.deg2rad(1.0)
 BASINS = 3
@@ -42,14 +43,14 @@ class OptimalGait:
 
     Attributes:
         x: Gait vector.
-        folded: Total costs G, shape (6,).
+        total_costs: Its total costs G, shape (K,).
         decrement: Undamped Newton decrement; above 1e-5 the optimum sits on a contact jump.
         starts: Solves of the whole search.
         iterations: Their iterations.
     """
 
     x: Array
-    folded: Array
+    total_costs: Array
     decrement: float
     starts: int
     iterations: int
@@ -62,13 +63,13 @@ Job = tuple[Array, tuple[Stage, ...], Array | None]
 class _Search:
     """Counts solves and keeps what they found."""
 
-    def __init__(self, planar: bool, w: Array, executor: Executor | None) -> None:
-        self.planar, self.w, self.executor = planar, w, executor
-        self.solver = solver_for(planar)
+    def __init__(self, spec: WalkerSpec, w: Array, executor: Executor | None) -> None:
+        self.spec, self.w, self.executor = spec, w, executor
+        self.solver = solver_for(spec)
         self.starts = self.iterations = 0
 
     def run(self, jobs: Sequence[Job]) -> list[Solution]:
-        tasks = [(self.planar, self.w, *job) for job in jobs]
+        tasks = [(self.spec, self.w, *job) for job in jobs]
         found: list[Solution] = run_tasks(polish, tasks, self.executor)
         self.starts += len(found)
         self.iterations += sum(s.iterations for s in found)
@@ -88,7 +89,7 @@ class _Search:
 
 
 def best_gait(
-    planar: bool,
+    spec: WalkerSpec,
     w: Array,
     rng: np.random.Generator,
     executor: Executor | None = None,
@@ -97,17 +98,17 @@ def best_gait(
     """Search hard for the best gait under weights ``w``.
 
     Args:
-        planar: Which body.
-        w: Weights, shape (6,).
+        spec: Which body, and its costs.
+        w: Weights, shape (K,).
         rng: Source of the hops.
         executor: Runs independent solves side by side.
         also: Further gait vectors to start from.
     """
-    w = check_weights(w)
-    job = _Search(planar, w, executor)
-    shipped = list(load_library(planar).values())
-    near = sorted(shipped[1:], key=lambda s: float(s.folded @ w))[:NEAREST]
-    starts = [s.gait.to_vector() for s in (shipped[0], *near)]
+    w = check_weights(w, spec)
+    job = _Search(spec, w, executor)
+    reference, *others = known_gaits(spec)
+    near = sorted(others, key=lambda s: float(s.total_costs @ w))[:NEAREST]
+    starts = [s.x for s in (reference, *near)]
     jobs: list[Job] = [(x, APPROACH, job.solver.dual(x)) for x in starts]
     found = sorted(job.run([*jobs, *((x, APPROACH, None) for x in also)]), key=job.search_cost)
     hops: list[Job] = [(job.hop(found[0], HOP, r), APPROACH, None) for r in rng.spawn(HOPS)]

@@ -1,4 +1,4 @@
-"""The forward problem "best gait for weights w", from the shipped gaits or from a demonstration."""
+"""The forward problem "best gait for weights w", from known gaits or from a demonstration."""
 
 from __future__ import annotations
 
@@ -6,66 +6,72 @@ from collections.abc import Iterable, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from walking_irl.arrays import Array
-from walking_irl.domains.humanoid.body.anatomy import load_walker
-from walking_irl.domains.humanoid.costs.defaults import OBJECTIVES
+from walking_irl.domains.contract import OnStep
+from walking_irl.domains.humanoid.body.load import SHIPPED
+from walking_irl.domains.humanoid.costs.defaults import DEFAULT_COSTS
 from walking_irl.domains.humanoid.gait.gait import Gait
 from walking_irl.domains.humanoid.gait.library import load_library
-from walking_irl.domains.humanoid.optimiser.newton import FAR, Stage, Status
-from walking_irl.domains.humanoid.optimiser.solver import (
-    DIRECT,
-    LADDER,
-    SMOOTH_DECREMENT,
-    GaitSolver,
-    Solution,
-    stage,
-)
-from walking_irl.domains.humanoid.optimiser.transcription import ROOT_PENALTY, Transcription
-from walking_irl.errors import InvalidInputError, SolverError
+from walking_irl.domains.humanoid.optimiser.newton import FAR, Status
+from walking_irl.domains.humanoid.optimiser.solver import SMOOTH_DECREMENT, GaitSolver, Solution
+from walking_irl.domains.humanoid.optimiser.stages import DIRECT, LADDER, NEARBY, Stage
+from walking_irl.domains.humanoid.optimiser.transcription import Transcription
+from walking_irl.domains.humanoid.spec import HUMANOID, WalkerSpec
+from walking_irl.domains.weights import normalised
+from walking_irl.errors import SolverError
 from walking_irl.types import Response
+from walking_irl.workers import run_tasks
 
-TO_PHYSICS = tuple(stage(p, 12, 1e-4, tether=1e5) for p in (1e4, 1e5, 1e6))
-"""Makes the mean of recorded cycles physical while it stays near itself."""
-PHYSICAL = 1e-3
-"""Root penalty, in units of cost, above which a demonstration is made physical first."""
 WORTH = 0.05
 """Regret above which an answer's sensitivity is not worth its price."""
-ARCHIVE_TOL = 2e-5
+SAME_COST = 2e-5
 """A solve that ends worse than a known gait by more than this is repeated from that gait."""
-CATALOGUE_STARTS = 3
+KNOWN_STARTS = 3
+
+
+class Start(NamedTuple):
+    """A known gait and its costs on the walker and under the costs that ask for it."""
+
+    x: Array
+    total_costs: Array
+    """G at full root penalty, shape (K,)."""
 
 
 @lru_cache
-def solver_for(planar: bool, threads: int = 1) -> GaitSolver:
-    """Solver of one body; one per process and number of threads."""
-    return GaitSolver(Transcription(load_walker(planar), threads=threads))
+def solver_for(spec: WalkerSpec = HUMANOID, threads: int = 1) -> GaitSolver:
+    """Solver of one body and its costs; one per process and number of threads."""
+    return GaitSolver(Transcription(spec.walker, spec.costs, threads=threads))
 
 
-def check_weights(w: Array) -> Array:
+@lru_cache
+def known_gaits(spec: WalkerSpec = HUMANOID) -> tuple[Start, ...]:
+    """Known gaits of a body, the reference first."""
+    library = load_library(spec.body).values()
+    if spec.body in SHIPPED and spec.costs == DEFAULT_COSTS:
+        return tuple(Start(g.gait.to_vector(), g.total_costs) for g in library)
+    problem = solver_for(spec).problem
+    vectors = [g.gait.to_vector() for g in library]
+    return tuple(Start(x, problem.evaluate(x).total_costs()) for x in vectors)
+
+
+def check_weights(w: Array, spec: WalkerSpec = HUMANOID) -> Array:
     """Weights as floats on the simplex.
 
     Raises:
         InvalidInputError: If they have another shape, or are negative, not finite or all zero.
     """
-    w = np.asarray(w, dtype=float)
-    names = ", ".join(o.name for o in OBJECTIVES)
-    if w.shape != (len(OBJECTIVES),):
-        raise InvalidInputError(f"expected {len(OBJECTIVES)} weights ({names}), got {w.size}")
-    if not np.isfinite(w).all() or (w < 0).any() or not w.any():
-        raise InvalidInputError(f"weights must be finite, >= 0 and not all zero, got {w.tolist()}")
-    w = w / w.max()  # against overflow
-    return np.asarray(w / w.sum())
+    return normalised(w, spec.stack.objectives)
 
 
 def polish(
-    planar: bool, w: Array, x: Array, stages: Sequence[Stage], root: Array | None = None
+    spec: WalkerSpec, w: Array, x: Array, stages: Sequence[Stage], root: Array | None = None
 ) -> Solution:
     """One solve, as a function that a process pool can call; see :meth:`.GaitSolver.solve`."""
-    return solver_for(planar).solve(w, x, stages, root=root)
+    return solver_for(spec).solve(w, x, stages, root=root)
 
 
 def respond(
@@ -105,101 +111,95 @@ def respond(
 
 
 def search(
-    planar: bool, w: Array, executor: Executor | None = None, starts: int = CATALOGUE_STARTS
+    spec: WalkerSpec, w: Array, executor: Executor | None = None, starts: int = KNOWN_STARTS
 ) -> Response:
-    """Best gait for weights ``w`` over the shipped gaits that are cheapest under ``w``.
+    """Best gait for weights ``w`` over the known gaits that are cheapest under ``w``.
 
     Raises:
         SolverError: If the solver stalls from every start.
     """
-    w = check_weights(w)
-    library = sorted(load_library(planar).values(), key=lambda s: float(s.folded @ w))[:starts]
-    starts_at = [s.gait.to_vector() for s in library]
-    tasks = [(planar, w, x, LADDER, solver_for(planar).dual(x)) for x in starts_at]
-    solutions = run_tasks(polish, tasks, executor)
+    w = check_weights(w, spec)
+    near = sorted(known_gaits(spec), key=lambda s: float(s.total_costs @ w))[:starts]
+    dual = solver_for(spec).dual
+    solutions = run_tasks(polish, [(spec, w, s.x, LADDER, dual(s.x)) for s in near], executor)
     solutions.sort(key=lambda s: float(s.total_costs @ w))
     if not np.isfinite(solutions[0].total_costs).all():
         raise SolverError(f"no gait found for weights {w.round(4).tolist()} from {starts} starts")
-    return respond(solver_for(planar), w, solutions[0], solutions[1:])
+    return respond(solver_for(spec), w, solutions[0], solutions[1:])
 
 
-def run_tasks(function: Any, tasks: Sequence[tuple[Any, ...]], executor: Executor | None) -> Any:
-    """Results of ``function(*task)`` in order, side by side where there is an executor."""
-    if executor is None:
-        return [function(*task) for task in tasks]
-    return [f.result() for f in [executor.submit(function, *task) for task in tasks]]
-
-
-class Imitator:
+class WarmStartSolver:
     """The learner's forward solver: it sees a demonstrated gait and starts from there.
 
     Starting elsewhere may end in another basin than the expert's, whose worse gaits would not cut.
-    A demonstration that no body could walk (the mean of recorded cycles) is made physical first.
-    The answers depend on the queries so far only through an archive: a solve that ends worse than a
-    known gait is repeated from that gait.
+    A demonstration that no body could walk, like the mean of recorded cycles, is made physical
+    first. The answers depend on the queries so far only through the gaits found: a solve that ends
+    worse than a known gait is repeated from that gait.
 
     Args:
         demonstration: Demonstrated gait.
-        planar: Which body.
+        spec: Which body, and its costs.
         threads: Threads of one solve.
+        on_step: Told of every iteration of a solve in this process: its number and the cost.
         mu: Demonstrated feature expectations, shape (K,); None: those of the gait itself.
 
     Attributes:
         start: Gait vector from which queries start.
         demonstrated: Total costs G of the start, shape (K,).
         known: Costs that an answer must beat to cut, -mu.
+        found: The answers so far.
     """
 
     def __init__(
         self,
         demonstration: Gait,
-        planar: bool = False,
+        spec: WalkerSpec = HUMANOID,
         threads: int = 1,
+        on_step: OnStep | None = None,
+        *,
         mu: Array | None = None,
     ) -> None:
-        self.planar, self.threads = planar, threads
-        solver = solver_for(planar, threads)
-        self.start = demonstration.to_vector()
-        ev = solver.problem.evaluate(self.start)
-        if ROOT_PENALTY * ev.root_square > PHYSICAL:
-            even = np.full(len(solver.problem.stack.objectives), 1.0)
-            self.start = solver.solve(even / even.sum(), self.start, TO_PHYSICS).x
-            ev = solver.problem.evaluate(self.start)
-        self.demonstrated = ev.total_costs()
+        self.spec, self.threads, self.on_step = spec, threads, on_step
+        solver, self.start = solver_for(spec, threads), demonstration.to_vector()
+        if solver.dual(self.start) is None:
+            even = np.ones(len(spec.stack.objectives))
+            self.start = solver.solve(even / even.sum(), self.start, NEARBY).x
+        self.demonstrated = solver.problem.evaluate(self.start).total_costs()
         self.known = self.demonstrated if mu is None else -np.asarray(mu)
         self.root = solver.dual(self.start)
-        self.archive: list[tuple[Array, Array]] = []
+        self.found: list[Start] = []
 
     def __getstate__(self) -> dict[str, Any]:
-        """One thread in another process: a pool already uses the cores."""
-        return {**self.__dict__, "threads": 1}
+        """One thread in another process, unseen: a pool already uses the cores."""
+        return {**self.__dict__, "threads": 1, "on_step": None}
 
     def __call__(self, w: Array) -> Response:
         """Best gait for weights ``w`` near the demonstration."""
-        solver = solver_for(self.planar, self.threads)
+        solver = solver_for(self.spec, self.threads)
         known = float(self.known @ w)
-        solutions = [solver.solve(w, self.start, DIRECT, known=known, root=self.root)]
-        better = self._better_start(w, solutions[0], known)
+        solutions = [self._solve(w, self.start, self.root, known)]
+        better = self._better_start(w, float(solutions[0].total_costs @ w), known)
         if better is not None:
-            root = solver.dual(better)
-            solutions.append(solver.solve(w, better, DIRECT, known=known, root=root))
+            solutions.append(self._solve(w, better, solver.dual(better), known))
         solutions.sort(key=lambda s: float(s.total_costs @ w))
         best = solutions[0]
-        self.archive.append((best.x, best.total_costs))
+        self.found.append(Start(best.x, best.total_costs))
         cost = float(best.total_costs @ w)
         if self.demonstrated @ w < cost * (1 - 1e-9):
             best = replace(best, x=self.start, total_costs=self.demonstrated, status=Status.STUCK)
         return respond(solver, w, best, solutions[1:], known < cost * (1 + WORTH))
 
+    def _solve(self, w: Array, x: Array, root: Array | None, known: float) -> Solution:
+        solver = solver_for(self.spec, self.threads)
+        return solver.solve(w, x, DIRECT, known=known, root=root, on_step=self.on_step)
+
     def recall(self, response: Response) -> None:
         """Learn of an answer that another run has found."""
-        self.archive.append((response.policy.to_vector(), -response.mu))
+        self.found.append(Start(response.policy.to_vector(), -response.mu))
 
-    def _better_start(self, w: Array, found: Solution, known: float) -> Array | None:
-        """A known gait that is cheaper than what was found, where that matters."""
-        cost = float(found.total_costs @ w)
-        if known > cost * (1 + FAR):
+    def _better_start(self, w: Array, cost: float, known: float) -> Array | None:
+        """A gait found before that is cheaper than a new answer, where the answer cuts little."""
+        best = min(self.found, key=lambda s: float(s.total_costs @ w), default=None)
+        if best is None or known > cost * (1 + FAR):
             return None
-        others = [(float(g @ w), x) for x, g in self.archive]
-        best = min(others, key=lambda item: item[0], default=(np.inf, None))
-        return best[1] if best[0] < cost * (1 - ARCHIVE_TOL) else None
+        return best.x if float(best.total_costs @ w) < cost * (1 - SAME_COST) else None

@@ -77,28 +77,7 @@ class Disturbance:
     push: Push | None = None
 
 
-class _Simulation(WalkerPhysics):
-    """The same simulation, whose steps check for trouble in a fifth of the time."""
-
-    def step(self, nstep: int = 1) -> None:
-        """Advance by ``nstep`` steps; raises PhysicsError where the state is no longer valid."""
-        if not self.legacy_step:
-            super().step(nstep)
-            return
-        model, data = self.model.ptr, self.data.ptr
-        warnings, before = self._warnings, self._warnings.tolist()
-        mujoco.mj_step2(model, data)
-        if nstep > 1:
-            mujoco.mj_step(model, data, nstep - 1)
-        mujoco.mj_step1(model, data)
-        after = warnings.tolist()
-        if after != before:  # let dm_control say what it is
-            warnings[:] = before
-            with self.check_invalid_state():
-                warnings[:] = after
-
-
-class Walk(control.Task):  # type: ignore[misc]
+class WalkTask(control.Task):  # type: ignore[misc]
     """Walk along a gait's phase without falling, for the reward w.phi.
 
     Attributes:
@@ -297,7 +276,7 @@ def environment(
     """
     if steps_per_control < 1:
         raise InvalidInputError(f"steps_per_control must be 1 or more, got {steps_per_control}")
-    task = Walk(
+    task = WalkTask(
         walker,
         start,
         random=np.random.RandomState(rng.bit_generator),
@@ -306,5 +285,5 @@ def environment(
         disturbance=disturbance,
         costs=costs,
     )
-    physics = _Simulation.of(walker, start.timestep)
+    physics = WalkerPhysics.of(walker, start.timestep)
     return control.Environment(physics, task, time_limit=time_limit, n_sub_steps=steps_per_control)

@@ -29,6 +29,7 @@ from walking_irl.domains.humanoid.optimiser.linearisation import (
     weighted,
 )
 from walking_irl.domains.humanoid.optimiser.ring import BorderedMatrix, Factor
+from walking_irl.domains.humanoid.optimiser.stages import Stage
 from walking_irl.domains.humanoid.optimiser.transcription import Evaluation
 
 UNDAMPED = 1e-9
@@ -48,17 +49,6 @@ CUTS, IDLE = 1e-3, 0.01
 regret ends the solve: there is no smooth minimum to be had, and the answer cuts already. It does if
 its regret is above CUTS, or what the undamped model promises is small against it."""
 CORRECTIONS = 3
-
-
-class Stage(NamedTuple):
-    """One stage of a homotopy in the root penalty."""
-
-    penalty: float
-    max_iter: int
-    tol: float
-    """Relative Newton decrement at which a gait counts as a minimum."""
-    tether: float = 0.0
-    """Weight of the squared distance from the start of the solve."""
 
 
 class Status(Enum):

@@ -9,15 +9,18 @@ solve returns the best gait that it saw, and says whether it is a minimum.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from walking_irl.arrays import Array
+from walking_irl.domains.contract import OnStep
 from walking_irl.domains.humanoid.optimiser.hessian import Structure, half_hessian
 from walking_irl.domains.humanoid.optimiser.linearisation import Linearisation
-from walking_irl.domains.humanoid.optimiser.newton import UNDAMPED, Newton, Stage, State, Status
+from walking_irl.domains.humanoid.optimiser.newton import UNDAMPED, Newton, State, Status
+from walking_irl.domains.humanoid.optimiser.perturbation import perturb
+from walking_irl.domains.humanoid.optimiser.stages import DIRECT, Stage
 from walking_irl.domains.humanoid.optimiser.transcription import ROOT_PENALTY, Transcription
 from walking_irl.errors import SolverError
 
@@ -26,19 +29,10 @@ JUMP = 5e-6
 MAX_ESCAPES = 4
 HAIR = np.deg2rad(0.002)
 """Perturbation of a stuck gait [rad]."""
+PHYSICAL = 1e-3
+"""Root penalty, in units of the cost, below which a gait can be walked as it is."""
 SMOOTH_DECREMENT = 1e-6
 """Undamped Newton decrement below which a gait counts as a smooth minimum."""
-
-
-def stage(raw_penalty: float, max_iter: int, tol: float, tether: float = 0.0) -> Stage:
-    """Stage with its penalty stated relative to the full one (1e6)."""
-    return Stage(ROOT_PENALTY * raw_penalty / 1e6, max_iter, tol, tether)
-
-
-DIRECT = (stage(1e6, 40, 1e-10),)
-"""From a gait of similar weights."""
-LADDER = (stage(1e4, 25, 1e-5), stage(1e6, 60, 1e-10))
-"""From a gait of other weights."""
 
 
 @dataclass
@@ -67,17 +61,22 @@ class GaitSolver:
 
     Attributes:
         problem: The transcription.
-        watch: Called after every iteration with its number and the cost, or None.
+        structure: Of its Hessians.
     """
 
     def __init__(self, problem: Transcription) -> None:
         self.problem = problem
-        self.watch: Callable[[int, float], None] | None = None
         self.structure = Structure(problem)
 
-    def dual(self, x: Array, penalty: float = ROOT_PENALTY) -> Array:
-        """Multipliers of the root forces that a converged gait carries, shape (N, n_root)."""
-        return np.asarray(penalty / self.problem.n_knots * self.problem.evaluate(x).root)
+    def dual(self, x: Array) -> Array | None:
+        """Multipliers of the root forces at an optimal gait of any weights, shape (N, n_root).
+
+        None if the gait is not physical: its root forces are no estimate then.
+        """
+        ev = self.problem.evaluate(x)
+        if not ROOT_PENALTY * ev.root_square < PHYSICAL:
+            return None
+        return np.asarray(ROOT_PENALTY / self.problem.n_knots * ev.root)
 
     def solve(
         self,
@@ -87,6 +86,7 @@ class GaitSolver:
         *,
         known: float | None = None,
         root: Array | None = None,
+        on_step: OnStep | None = None,
     ) -> Solution:
         """Best gait for weights ``w`` near the gait ``x``.
 
@@ -98,6 +98,7 @@ class GaitSolver:
                 an optimum.
             root: Multipliers of the root forces at the start (:meth:`dual` of an optimal gait of
                 other weights); None: unknown, the first step is Gauss-Newton's.
+            on_step: Told of every iteration.
 
         Raises:
             SolverError: If the cost of the start is not finite.
@@ -106,14 +107,19 @@ class GaitSolver:
         anchor, iterations, status = x, 0, Status.CAPPED
         for s in stages:
             newton = Newton(self.structure, w, s, anchor, known=known, root=root)
-            at, n, status = self._stage(newton, x, passed, iterations)
+
+            def told(count: int, cost: float, before: int = iterations) -> None:
+                if on_step is not None:
+                    on_step(before + count, cost)
+
+            at, n, status = self._stage(newton, x, passed, told)
             x, root, iterations = at.ev.x, newton.root, iterations + n
         total = self.problem.evaluate(x).total_costs()
         many = np.array(passed).reshape(-1, len(total))
         return Solution(x, total, many, iterations, status, root)
 
     def _stage(
-        self, newton: Newton, x: Array, passed: list[Array], before: int
+        self, newton: Newton, x: Array, passed: list[Array], on_step: OnStep
     ) -> tuple[State, int, Status]:
         """One stage with its escapes: the best state, iterations, and how that one ended."""
         at = newton.state(x)
@@ -127,8 +133,7 @@ class GaitSolver:
         def watch(cost: float) -> None:
             nonlocal count
             count += 1
-            if self.watch is not None:
-                self.watch(before + count, cost)
+            on_step(count, cost)
 
         for escape in range(MAX_ESCAPES + 1):
             newton.stage = newton.stage._replace(max_iter=limit - count)
@@ -196,26 +201,5 @@ class GaitSolver:
         return np.inf if found is None else found[2]
 
     def perturb(self, x: Array, amplitude: float, rng: np.random.Generator) -> Array:
-        """Smooth random change of the joint angles that keeps the mirror symmetry.
-
-        Args:
-            x: Gait vector.
-            amplitude: Standard deviation of the first harmonic [rad].
-            rng: Source of randomness.
-        """
-        p = self.problem
-        q = x[:-2].reshape(p.n_knots, p.nv).copy()
-        phase = np.arange(p.n_knots) / (2 * p.n_knots)
-        names = p.walker.joints
-        for j, name in enumerate(names):
-            if j < p.walker.n_root or not name.endswith("_r"):
-                continue
-            c = rng.normal(size=(2, 3)) * amplitude / np.arange(1, 4)
-            q[:, j] += _harmonics(c, phase)
-            q[:, names.index(name[:-2] + "_l")] += _harmonics(c, phase + 0.5)
-        return np.concatenate([q.ravel(), x[-2:]])
-
-
-def _harmonics(c: Array, phase: Array) -> Array:
-    angle = 2 * np.pi * np.outer(phase, np.arange(1, c.shape[1] + 1))
-    return np.asarray(np.cos(angle) @ c[0] + np.sin(angle) @ c[1])
+        """See :func:`~.perturbation.perturb`."""
+        return perturb(self.problem.walker, x, amplitude, rng)
