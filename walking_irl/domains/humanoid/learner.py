@@ -18,7 +18,7 @@ from walking_irl.domains.humanoid.gait.gait import Gait
 from walking_irl.domains.humanoid.gait.library import load_library
 from walking_irl.domains.humanoid.optimiser.newton import FAR, Status
 from walking_irl.domains.humanoid.optimiser.solver import SMOOTH_DECREMENT, GaitSolver, Solution
-from walking_irl.domains.humanoid.optimiser.stages import DIRECT, LADDER, NEARBY, Stage
+from walking_irl.domains.humanoid.optimiser.stages import DIRECT, LADDER, Stage
 from walking_irl.domains.humanoid.optimiser.transcription import Transcription
 from walking_irl.domains.humanoid.spec import HUMANOID, WalkerSpec
 from walking_irl.domains.weights import normalised
@@ -161,9 +161,7 @@ class WarmStartSolver:
     ) -> None:
         self.spec, self.threads, self.on_step = spec, threads, on_step
         solver, self.start = solver_for(spec, threads), demonstration.to_vector()
-        if solver.dual(self.start) is None:
-            even = np.ones(len(spec.stack.objectives))
-            self.start = solver.solve(even / even.sum(), self.start, NEARBY).x
+        self.start = solver.physical(self.start)
         self.demonstrated = solver.problem.evaluate(self.start).total_costs()
         self.known = self.demonstrated if mu is None else -np.asarray(mu)
         self.root = solver.dual(self.start)

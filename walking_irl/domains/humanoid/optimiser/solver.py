@@ -20,7 +20,7 @@ from walking_irl.domains.humanoid.optimiser.hessian import Structure, half_hessi
 from walking_irl.domains.humanoid.optimiser.linearisation import Linearisation
 from walking_irl.domains.humanoid.optimiser.newton import UNDAMPED, Newton, State, Status
 from walking_irl.domains.humanoid.optimiser.perturbation import perturb
-from walking_irl.domains.humanoid.optimiser.stages import DIRECT, Stage
+from walking_irl.domains.humanoid.optimiser.stages import DIRECT, TETHERS, Stage, nearby
 from walking_irl.domains.humanoid.optimiser.transcription import ROOT_PENALTY, Transcription
 from walking_irl.errors import SolverError
 
@@ -78,6 +78,15 @@ class GaitSolver:
             return None
         return np.asarray(ROOT_PENALTY / self.problem.n_knots * ev.root)
 
+    def physical(self, x: Array) -> Array:
+        """The gait ``x``, or a gait near it that can be walked, at even weights."""
+        k, shown = len(self.problem.stack.objectives), x
+        for tether in TETHERS:
+            if self.dual(x) is not None:
+                break
+            x = self.solve(np.full(k, 1 / k), shown, nearby(tether)).x
+        return x
+
     def solve(
         self,
         w: Array,
@@ -125,7 +134,7 @@ class GaitSolver:
         at = newton.state(x)
         if not np.isfinite(at.cost):
             raise SolverError(
-                "the gait to start from has no finite cost; start from one of the shipped gaits"
+                "the gait to start from has no finite cost; start from one of the known gaits"
             )
         rng, count, limit = np.random.default_rng(0), 0, newton.stage.max_iter
         best, best_status, best_root = at, Status.STUCK, newton.root

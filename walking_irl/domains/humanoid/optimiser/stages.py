@@ -27,6 +27,11 @@ DIRECT = (stage(1e6, 40, 1e-10),)
 """From a gait of similar weights."""
 LADDER = (stage(1e4, 25, 1e-5), stage(1e6, 60, 1e-10))
 """From a gait of other weights."""
-NEARBY = tuple(stage(p, 12, 1e-4, tether=1e5) for p in (1e4, 1e5, 1e6))
-"""To the nearest physical gait, whatever it costs: of the mean of recorded cycles, or of a person's
-walk; its root forces are what the penalty leaves."""
+TETHERS = (1e5, 1e3, 1e1, 1e-1)
+"""To be tried in turn until the tethered gait is physical: the first holds the mean of recorded
+cycles, whose deviations are small, the last a gait that was perturbed by degrees."""
+
+
+def nearby(tether: float) -> tuple[Stage, ...]:
+    """To a physical gait near the start, whatever it costs; its root forces are what is left."""
+    return tuple(stage(p, 12, 1e-4, tether) for p in (1e4, 1e5, 1e6))
