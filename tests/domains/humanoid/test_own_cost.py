@@ -1,5 +1,6 @@
 """A cost of one's own in one file: it is learnt, solved for, measured and rewarded like the six."""
 
+import pickle
 from dataclasses import dataclass
 
 import numpy as np
@@ -107,6 +108,11 @@ def test_a_changed_stack_goes_through_learner_trials_and_environment(domain):
         assert draw(np.random.default_rng(0), w).shape == (k,)
     with pytest.raises(InvalidInputError, match=rf"expected {k} weights .*got {k + 1}"):
         check_weights(np.ones(k + 1), domain.spec)
+
+
+def test_own_costs_travel_to_worker_processes():
+    copy = pickle.loads(pickle.dumps(SEVEN.spec))
+    assert copy == SEVEN.spec and solver_for(copy) is solver_for(SEVEN.spec)
 
 
 def test_own_cost_has_the_share_of_a_reference_that_does_not_know_it():

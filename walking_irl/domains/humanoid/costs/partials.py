@@ -26,6 +26,21 @@ STENCIL = ((1.0, 8 / 12), (-1.0, -8 / 12), (2.0, -1 / 12), (-2.0, 1 / 12))
 """Central difference of fourth order: steps and coefficients."""
 
 
+SIZES = {
+    "q": 0.02,
+    "v": 0.1,
+    "v_next": 0.1,
+    "a": 5.0,
+    "tau": 1.0,
+    "tau_next": 1.0,
+    "s": 1.0,
+    "s_next": 1.0,
+    "h": 5e-3,
+}
+"""How far a number must move to change a residual a lot, within three decades [SI units]."""
+POSITION_SIZE = 2e-3  # the same of a sensor that reads a point of the body [m]
+
+
 def first_partials(
     residual: Callable[..., Any], reads: Sequence[Array], shape: tuple[int, int]
 ) -> Array:

@@ -28,24 +28,16 @@ from walking_irl.domains.humanoid.costs.base import (
     Squares,
     Term,
 )
+from walking_irl.domains.humanoid.costs.checks import check_costs, check_term
 from walking_irl.domains.humanoid.costs.defaults import DEFAULT_COSTS, UNIT, Costs
-from walking_irl.domains.humanoid.costs.partials import first_partials, second_partials
-from walking_irl.errors import InvalidInputError
+from walking_irl.domains.humanoid.costs.partials import (
+    POSITION_SIZE,
+    SIZES,
+    first_partials,
+    second_partials,
+)
 from walking_irl.types import Objective, Rollout
 
-SIZES = {
-    "q": 0.02,
-    "v": 0.1,
-    "v_next": 0.1,
-    "a": 5.0,
-    "tau": 1.0,
-    "tau_next": 1.0,
-    "s": 1.0,
-    "s_next": 1.0,
-    "h": 5e-3,
-}
-"""How far a number must move to change a residual a lot, within three decades [SI units]."""
-POSITION_SIZE = 2e-3  # the same of a sensor that reads a point of the body [m]
 REFERENCE_SHARE = 0.1
 """Of a cost that does not know its coefficient in the most human gait."""
 
@@ -90,7 +82,7 @@ class CostStack:
         self.walker, self.costs = walker, tuple(costs)
         self.per_metre = tuple(c for c in costs if isinstance(c, Cost))
         self.shared = tuple(c for c in costs if isinstance(c, SharedCost))
-        _check(self.costs, self.per_metre)
+        check_costs(self.costs, self.per_metre)
         self.objectives: tuple[Objective, ...] = tuple(c.objective for c in self.per_metre)
         self.places: list[Place] = []
         edge, self.n_per_metre = 0, 0
@@ -104,7 +96,7 @@ class CostStack:
                 unique = tuple(len(np.unique(r.columns)) == len(r.columns) for r in term.reads)
                 columns = slice(edge, edge + width)
                 self.places.append(Place(term, columns, reads, unique, cost, joints))
-                _check_reads(cost, term, width)
+                check_term(cost, term, width)
                 edge += width
             if k < len(self.per_metre):
                 self.n_per_metre = edge
@@ -290,49 +282,3 @@ def _motors(walker: Walker, term: Term) -> Indices | None:
     if not motors or any(m.min() < 0 or not np.array_equal(m, motors[0]) for m in motors):
         return None
     return motors[0]
-
-
-def _check(costs: Costs, per_metre: tuple[Cost, ...]) -> None:
-    names = [c.name for c in costs]
-    if not per_metre:
-        raise InvalidInputError("a walker needs at least one cost per metre to walk for")
-    if len(set(names)) < len(names):
-        raise InvalidInputError(f"costs need different names, got {', '.join(names)}")
-    for cost in per_metre:
-        if not (np.isfinite(cost.scale) and cost.scale > 0):
-            raise InvalidInputError(f"the scale of {cost.name} must be > 0, got {cost.scale}")
-
-
-def _check_reads(cost: Squares, term: Term, width: int) -> None:
-    """Refuse what complex steps would differentiate wrongly, and say so early."""
-    for read in term.reads:
-        if read.channel not in CHANNELS:
-            raise InvalidInputError(
-                f"{cost.name} reads {read.channel!r}; choose from {', '.join(CHANNELS)}"
-            )
-        if read.channel != "h" and len(read.columns) != width:
-            raise InvalidInputError(
-                f"{cost.name} reads {len(read.columns)} columns of {read.channel} "
-                f"for {width} residuals; every read needs one column for each"
-            )
-    if not term.reads:
-        return
-    x = [
-        np.abs(1 + np.random.default_rng(p).normal(size=(3, width))) * SIZES[r.channel]
-        for p, r in enumerate(term.reads)
-    ]
-    exact = first_partials(term.residual, x, (3, width))
-    for p, read in enumerate(term.reads):
-        step = 1e-5 * SIZES[read.channel]
-        ends = [
-            np.asarray(term.residual(*(v + sign * step * (p == o) for o, v in enumerate(x))))
-            for sign in (1, -1)
-        ]
-        difference = (ends[0] - ends[1]) / (2 * step)
-        wrong = np.abs(difference - exact[p]) > 1e-4 * (np.abs(difference).max() + 1e-9)
-        if np.median(wrong) > 0:
-            raise InvalidInputError(
-                f"the residual of {cost.name} must be an elementwise, analytic function that takes "
-                f"complex numbers (no abs, no branch on a value): its derivative by complex steps "
-                f"with respect to {read.channel} is not that by differences"
-            )
