@@ -65,15 +65,19 @@ def half_hessian(
     lin = at.lin
     pairs, m = structure.pairs, lin.evaluation.motion
     numbers = pairs.numbers(_second_by_reads(at, is_exact), m.h, m.a)
-    K = _by_slots(at, pairs, numbers)
+    K = _half_by_slots(at, pairs, numbers)
     glob = _by_globals(at, pairs, numbers)
     windows = Windows(m.v, m.a, m.h, lin.problem.walker.mirror)
     gradient = None
     if is_exact:
         multipliers, v_next = _multipliers(at, root)
-        _add_curvature(at, K, multipliers)
+        bent = _half_curvature(at, multipliers)
+        if bent is not None:
+            K += bent
         glob.columns[0, :, 2 * m.v.shape[1] :] += v_next  # v_next = v + h a
         gradient = lin.chain.by_coordinates(multipliers)
+    K = K + K.mT
+    pairs.uu.add(numbers, K)
     assembly = Assembly(windows)
     assembly.add_own(K)
     _add_ahead(assembly, at, pairs, numbers)
@@ -104,8 +108,8 @@ def _second_by_reads(at: Weighted, is_exact: bool) -> Array:
     return np.concatenate(out)
 
 
-def _by_slots(at: Weighted, pairs: Pairs, numbers: Array) -> Array:
-    """K without curvature, shape (N, 3 nv, 3 nv)."""
+def _half_by_slots(at: Weighted, pairs: Pairs, numbers: Array) -> Array:
+    """K of the outputs without curvature, its transpose yet to be added; (N, 3 nv, 3 nv)."""
     lin = at.lin
     rows, knots = lin.chain.rows, pairs.knots
     nv, middle = knots.nv, knots.n // 2
@@ -124,9 +128,7 @@ def _by_slots(at: Weighted, pairs: Pairs, numbers: Array) -> Array:
     left, right = rows[middle, nv + lin.chain.feet]
     align = (left - right) * at.factors.anchors[1]
     K[middle] += 0.5 * np.outer(align, align)
-    K = K + K.mT
-    pairs.uu.add(numbers, K)
-    return K
+    return np.asarray(K)
 
 
 def _by_globals(at: Weighted, pairs: Pairs, numbers: Array) -> _Global:
@@ -145,23 +147,14 @@ def _multipliers(at: Weighted, root: Array | None) -> tuple[Multipliers, Array]:
     return folded, channels.v_next
 
 
-def _add_curvature(at: Weighted, K: Array, y: Multipliers) -> None:
-    """Add the second derivatives of the outputs, if there is a closed form."""
+def _half_curvature(at: Weighted, y: Multipliers) -> Array | None:
+    """Half the outputs' own second derivatives, if there is a closed form; (N, 3 nv, 3 nv)."""
     p = at.lin.problem
-    nv, n_root = p.nv, p.walker.n_root
-    lam = y.outputs[:, :nv].copy()
-    lam[:, :n_root] /= p.root_unit
+    lam = y.outputs[:, : p.nv].copy()
+    lam[:, : p.walker.n_root] /= p.root_unit
     sigma = np.zeros((p.n_knots, p.walker.model.nsensordata))
-    sigma[:, p.sensors] = y.outputs[:, nv:]
-    c = at.lin.derivatives.curvature(lam, sigma)
-    if c is None:
-        return
-    q, v, a = (slice(b * nv, (b + 1) * nv) for b in range(3))
-    for x, y_, block in ((q, q, c.qq), (v, v, c.vv), (a, a, c.aa)):
-        K[:, x, y_] += block
-    for x, y_, block in ((q, v, c.qv), (q, a, c.qa), (v, a, c.va)):
-        K[:, x, y_] += block
-        K[:, y_, x] += block.mT
+    sigma[:, p.sensors] = y.outputs[:, p.nv :]
+    return at.lin.derivatives.half_curvature(lam, sigma)
 
 
 def _add_ahead(assembly: Assembly, at: Weighted, pairs: Pairs, numbers: Array) -> None:

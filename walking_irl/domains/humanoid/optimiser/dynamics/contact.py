@@ -69,7 +69,7 @@ class Soles:
         for row, c in zip(self.chain, chains, strict=True):
             row[: len(c)] = c
         self.upper = np.triu(np.ones((self.width, self.width)))
-        self.strict = np.triu(self.upper, 1)
+        self.half = self.upper - 0.5 * np.eye(self.width)
 
     def on_chains(self, x: Array) -> Array:
         """Quantities of dofs, (N, nv, ...), by foot and dof of its chain, (N, feet, m, ...)."""
@@ -238,11 +238,11 @@ class Contact:
         soles, axes, m = self.soles, self.axes, self.soles.width
         by_w, by_s = (axes @ force_matrix(wrench[:, :, i]).mT for i in range(2))
         turned = np.concatenate([w_turned, self.turned], -1)
-        nested = soles.upper * -(np.concatenate([by_w, by_s], -1) @ turned.mT)
+        nested = soles.half * -(np.concatenate([by_w, by_s], -1) @ turned.mT)
         levers = summed[..., 3 * m + 3 :]
         spins = np.concatenate([w_turned[..., :3], self.turned[..., :3]], -1)
         mixed = spins @ levers.mT
-        qq = summed[..., :m] + nested + soles.strict.T * nested.mT + mixed + mixed.mT
+        qq = 0.5 * summed[..., :m] + nested + mixed
         qy = summed[..., m : 2 * m] - soles.upper * (by_s @ axes.mT)
         qy += levers[..., 3:] @ axes[..., :3].mT
         return Bent(qq, qy, summed[..., 2 * m : 3 * m], summed[..., 3 * m : 3 * m + 3])
@@ -251,6 +251,7 @@ class Contact:
 class Bent(NamedTuple):
     """Second derivatives on the chains with respect to q and y = a + B v, (N, feet, m, m).
 
+    ``qq`` is half of them: its transpose is to be added.
     ``turn`` (N, feet, m, 3) adds to :attr:`~.rigid_body.Halves.turn`.
     """
 

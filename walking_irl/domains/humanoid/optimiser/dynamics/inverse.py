@@ -28,17 +28,6 @@ FD_STEP = 1e-7
 """Step of the finite differences where there is no closed form."""
 
 
-class Curvature(NamedTuple):
-    """Second derivatives of lambda.tau + sigma.s, indexed [knot, first, second]; (N, nv, nv)."""
-
-    qq: Array
-    qv: Array
-    qa: Array
-    vv: Array
-    va: Array
-    aa: Array
-
-
 class Derivatives:
     """First derivatives at N knots, output before input.
 
@@ -54,12 +43,16 @@ class Derivatives:
     s_v: Array
     s_a: Array
 
-    def curvature(self, lam: Array, sigma: Array) -> Curvature | None:
+    def half_curvature(self, lam: Array, sigma: Array) -> Array | None:
         """Second derivatives of lambda.tau + sigma.s, or None where there is no closed form.
 
         Args:
             lam: Multipliers of all generalised forces, shape (N, nv).
             sigma: Multipliers of all sensors, shape (N, ns).
+
+        Returns:
+            Matrices X of shape (N, 3 nv, 3 nv) whose X + X' are the second derivatives with respect
+            to (q, v, a) of each knot.
         """
         return None
 
@@ -137,40 +130,37 @@ class ClosedForm(Derivatives):
             self.s_a[:, row, square.dofs] = normal_a
             self.s_v[:, row, square.dofs] = soles.soft.damping * normal_a
 
-    def curvature(self, lam: Array, sigma: Array) -> Curvature:
-        """Second derivatives of lambda.tau + sigma.s; see :meth:`Derivatives.curvature`."""
+    def half_curvature(self, lam: Array, sigma: Array) -> Array:
+        """Half the second derivatives; see :meth:`Derivatives.half_curvature`."""
         tree, soles, plan = self.parts[:3]
-        axes = self.body.at.axes
+        axes, n, nv, B = self.body.at.axes, len(lam), tree.nv, soles.soft.damping
         angular = self.sensors.angular(sigma)
         halves, W, omega = self.body.curvature(axes * lam[..., None], angular)
-        whole = Whole(*np.zeros((4, *lam.shape, tree.nv)))
-        self.sensors.bend(sigma, halves, whole)
-        normal = np.zeros((len(lam), len(soles.bodies)))
+        out = np.zeros((n, 3 * nv, 3 * nv))
+        q, v, a = (slice(k * nv, (k + 1) * nv) for k in range(3))
+        self.sensors.bend(
+            sigma, halves, Whole(out[:, q, q], out[:, q, v], out[:, q, a], out[:, v, v])
+        )
+        normal = np.zeros((n, len(soles.bodies)))
         for row, foot in plan.touch:
             normal[:, foot] += sigma[:, row]
         bent = self.contact.curvature(lam, normal, W, omega)
         for k, square in enumerate(soles.squares):
             halves.turn[:, square.dofs] += bent.turn[:, k, : square.size]
-        qq = halves.qq
-        qq += axes[..., :3] @ halves.turn.mT
-        C, U, B = tree.carries, tree.strictly, soles.soft.damping
-        mirrored = [
-            C * qq + (U * qq).mT,
-            C * halves.qv + (U * halves.vq).mT,
-            C * halves.qa + (U * halves.aq).mT,
-            C * halves.vv + (U * halves.vv).mT,
-        ]
-        for x, y in zip(whole, mirrored, strict=True):
-            x += y
-        i = np.arange(tree.nv)
-        whole.qq[:, i, i] += lam * self._bends[0]
-        whole.vv[:, i, i] += lam * self._bends[1]
-        va, aa = np.zeros_like(qq), np.zeros_like(qq)
-        spread = [(whole.qq, bent.qq, 1.0), (whole.qv, bent.qy, B), (whole.qa, bent.qy, 1.0)]
-        spread += [(whole.vv, bent.yy, B * B), (va, bent.yy, B), (aa, bent.yy, 1.0)]
-        for to, blocks, factor in spread:
-            soles.spread(blocks, to, factor)
-        return Curvature(whole.qq, whole.qv, whole.qa, whole.vv, va, aa)
+        halves.qq[:] += axes[..., :3] @ halves.turn.mT
+        C, U = tree.half_carries, tree.strictly
+        out[:, q, q] += C * halves.qq
+        out[:, v, v] += C * halves.vv
+        out[:, q, v] += tree.carries * halves.qv + (U * halves.vq).mT
+        out[:, q, a] += tree.carries * halves.qa + (U * halves.aq).mT
+        i = np.arange(nv)
+        out[:, i, i] += 0.5 * lam * self._bends[0]
+        out[:, nv + i, nv + i] += 0.5 * lam * self._bends[1]
+        spread = [(q, q, bent.qq, 1.0), (q, v, bent.qy, B), (q, a, bent.qy, 1.0)]
+        spread += [(v, v, bent.yy, 0.5 * B * B), (v, a, bent.yy, B), (a, a, bent.yy, 0.5)]
+        for rows, columns, blocks, factor in spread:
+            soles.spread(blocks, out[:, rows, columns], factor)
+        return out
 
 
 class FiniteDifferences(Derivatives):

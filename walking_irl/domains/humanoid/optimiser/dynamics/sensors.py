@@ -63,7 +63,10 @@ class Plan(NamedTuple):
 
 
 class Whole(NamedTuple):
-    """Second derivatives that need no mirroring, shape (N, nv, nv); see :class:`Halves`."""
+    """Second derivatives to be added in place, (N, nv, nv); ``qq`` and ``vv`` plus their transpose.
+
+    Other than in :class:`Halves`, entries hold wherever they stand.
+    """
 
     qq: Array
     qv: Array
@@ -162,9 +165,8 @@ class Sensors:
         pull = _summed(sigma, self.plan.centres) - cross(body.momentum[:, 3:], m)
         turn += com_q @ -skew(pull).mT
         com_m = com_q @ -skew(m).mT  # com_q x m
-        both = com_m @ body.momentum_q[..., 3:].mT
-        np.add(whole.qq, both + both.mT, out=whole.qq)
-        np.add(whole.qv, com_m @ body.I_S[..., 3:].mT, out=whole.qv)
+        whole.qq[:] += com_m @ body.momentum_q[..., 3:].mT
+        whole.qv[:] += com_m @ body.I_S[..., 3:].mT
         for part in self.plan.spins:
             t = self.turning[part.body]
             spin = sigma[:, part.start : part.start + 3]
@@ -213,12 +215,10 @@ class _Accelerated:
         J_f, J_f2, v_f = J @ with_f, J @ with_f2, v_q @ with_f
         spin, spin_q = t.axes[..., :3], t.V_q[..., :3]
         left = np.concatenate([J_f, J_f2 + v_f], -1)
-        x = np.concatenate([t.A_q[..., :3], spin_q], -1) @ left.mT
-        whole.qq[at] += x + x.mT
+        whole.qq[at] += left @ np.concatenate([t.A_q[..., :3], spin_q], -1).mT
         whole.qv[at] += left @ np.concatenate([t.A_v[..., :3], spin], -1).mT
         whole.qv[at] -= (spin_q @ with_f) @ J.mT
-        y = -(spin @ with_f) @ J.mT
-        whole.vv[at] += y + y.mT
+        whole.vv[at] -= (spin @ with_f) @ J.mT
         whole.qa[at] += J_f @ spin.mT
 
 

@@ -16,7 +16,7 @@ class Tree:
 
     Attributes:
         carries: 1 where dof j carries dof i or is it, shape (nv, nv), indexed [j, i].
-        strictly: The same without the diagonal.
+        strictly: The same without the diagonal; ``half_carries`` with half of it.
         moves: 1 where dof j moves body b, shape (nv, nb).
         gravity: Acceleration of the world, (0; -g), shape (6,).
         mass: Of the whole tree [kg].
@@ -32,6 +32,7 @@ class Tree:
                 self.carries[j, i] = 1
                 j = model.dof_parentid[j]
         self.strictly = self.carries - np.eye(nv)
+        self.half_carries = self.carries - 0.5 * np.eye(nv)
         self.moves = np.zeros((nv, nb))
         for body in range(1, nb):
             b = body
@@ -55,7 +56,6 @@ class Square:
     def __init__(self, dofs: Indices) -> None:
         n = len(dofs)
         self.size = n
-        self.upper, self.strict = np.triu(np.ones((n, n))), np.triu(np.ones((n, n)), 1)
         consecutive = bool(n) and dofs[-1] - dofs[0] == n - 1
         self.dofs: Any = slice(int(dofs[0]), int(dofs[-1]) + 1) if consecutive else dofs
         rows = self.dofs if consecutive else dofs[:, None]
