@@ -2,8 +2,9 @@
 
 Newton's method finds the minimum of a basin at once, so the price is the search for the basin: from
 the known gaits that are cheapest under the weights, from the reference, and from hops off the
-best, all at a low root penalty; the best basins go to the full one. An optimum that is no smooth
-minimum sits on a contact jump: it is perturbed and solved again.
+best, all at a low root penalty; the best basins go to the full one. A still lower penalty first
+lets a gait leave its basin for a better one, or a worse one: both are tried. An optimum that is no
+smooth minimum sits on a contact jump: it is perturbed and solved again.
 """
 
 from __future__ import annotations
@@ -22,9 +23,12 @@ from walking_irl.domains.humanoid.spec import WalkerSpec
 from walking_irl.workers import run_tasks
 
 APPROACH = (stage(1e4, 25, 1e-5),)
+SOFTLY = (stage(1e3, 25, 1e-4), *APPROACH)
+"""From a gait of other weights, first through a penalty at which it may leave its basin."""
 FINISH = (stage(1e6, 60, 1e-11),)
-NEAREST = 5
-"""Known gaits from which a search starts, the cheapest under the weights."""
+NEAREST = 4
+"""Known gaits from which a search starts softly, the cheapest under the weights; the first of them
+and the reference also keep their basins."""
 HOPS = 2
 HOP = np.deg2rad(1.0)
 BASINS = 3
@@ -106,10 +110,10 @@ def best_gait(
     """
     w = check_weights(w, spec)
     job = _Search(spec, w, executor)
-    reference, *others = known_gaits(spec)
-    near = sorted(others, key=lambda s: float(s.total_costs @ w))[:NEAREST]
-    starts = [s.x for s in (reference, *near)]
-    jobs: list[Job] = [(x, APPROACH, job.solver.dual(x)) for x in starts]
+    known = known_gaits(spec)
+    near = [s.x for s in sorted(known, key=lambda s: float(s.total_costs @ w))[:NEAREST]]
+    starts = [(x, SOFTLY) for x in near] + [(near[0], APPROACH), (known[0].x, APPROACH)]
+    jobs: list[Job] = [(x, stages, job.solver.dual(x)) for x, stages in starts]
     found = sorted(job.run([*jobs, *((x, APPROACH, None) for x in also)]), key=job.search_cost)
     hops: list[Job] = [(job.hop(found[0], HOP, r), APPROACH, None) for r in rng.spawn(HOPS)]
     found = sorted(found + job.run(hops), key=job.search_cost)
