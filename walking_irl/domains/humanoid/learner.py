@@ -71,7 +71,7 @@ def polish(
     spec: WalkerSpec, w: Array, x: Array, stages: Sequence[Stage], root: Array | None = None
 ) -> Solution:
     """One solve, as a function that a process pool can call; see :meth:`.GaitSolver.solve`."""
-    return solver_for(spec).solve(w, x, stages, root=root)
+    return replace(solver_for(spec).solve(w, x, stages, root=root), model=None)
 
 
 def respond(
@@ -96,8 +96,7 @@ def respond(
     }
     sensitivity = None
     if is_wanted:
-        lin = solver.linearise(best.x)
-        found = solver.sensitivity(w, lin, best.root)
+        found = solver.sensitivity_of(w, best)
         info["decrement"] = np.inf if found is None else found[2]
         if found is not None and found[2] < SMOOTH_DECREMENT:
             sensitivity = found[0]
@@ -184,7 +183,14 @@ class WarmStartSolver:
         self.found.append(Start(best.x, best.total_costs))
         cost = float(best.total_costs @ w)
         if self.demonstrated @ w < cost * (1 - 1e-9):
-            best = replace(best, x=self.start, total_costs=self.demonstrated, status=Status.STUCK)
+            best = Solution(
+                self.start,
+                self.demonstrated,
+                best.passed,
+                best.iterations,
+                Status.STUCK,
+                self.root,
+            )
         return respond(solver, w, best, solutions[1:], known < cost * (1 + WORTH))
 
     def _solve(self, w: Array, x: Array, root: Array | None, known: float) -> Solution:

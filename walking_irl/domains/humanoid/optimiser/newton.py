@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from enum import Enum
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -117,17 +118,20 @@ class Model:
                 else:
                     damping *= 10
 
-    def decrement(self) -> float:
-        """Undamped Newton decrement g'H^-1 g/2 of the half cost; inf if H is indefinite.
-
-        Where there is no exact Hessian, of Gauss-Newton's.
-        """
+    @cached_property
+    def undamped(self) -> Factor | None:
+        """Factor of the exact Hessian, else of Gauss-Newton's; None if it is indefinite."""
         has_exact = self._exact is not None or self.shares[0] > 0
         try:
-            factor = self.matrix(1.0 if has_exact else 0.0).factor(UNDAMPED, self.tether)
+            return self.matrix(1.0 if has_exact else 0.0).factor(UNDAMPED, self.tether)
         except np.linalg.LinAlgError:
+            return None
+
+    def decrement(self) -> float:
+        """Undamped Newton decrement g'H^-1 g/2 of the half cost; inf if H is indefinite."""
+        if self.undamped is None:
             return np.inf
-        return 0.5 * float(self.gradient @ factor.solve(self.gradient))
+        return 0.5 * float(self.gradient @ self.undamped.solve(self.gradient))
 
 
 class Step(NamedTuple):
@@ -148,6 +152,7 @@ class Newton:
     Attributes:
         root: Dual estimate of the root forces; None until the first step.
         damping: That the next iteration starts with.
+        last: Model of the last gait that was linearised.
     """
 
     def __init__(
@@ -165,6 +170,7 @@ class Newton:
         self.tether = np.full(anchor.size, stage.tether)
         self.tether[-2:] *= anchor.size  # L and T concern all knots
         self.damping = START_DAMPING
+        self.last: Model | None = None
 
     def state(self, x: Array) -> State:
         """The gait ``x`` with its cost."""
@@ -209,6 +215,7 @@ class Newton:
         hidden = 0  # steps in a row that only damping made small
         for iteration in range(1, self.stage.max_iter + 1):
             model, stop = self.model(at), self.stop(at)
+            self.last = model
             step = self.step(at, model, stop)
             is_small = step.predicted < stop * at.cost
             decrement, cost = np.nan, at.cost

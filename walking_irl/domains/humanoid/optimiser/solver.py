@@ -18,8 +18,9 @@ from walking_irl.arrays import Array
 from walking_irl.domains.contract import OnStep
 from walking_irl.domains.humanoid.optimiser.hessian import Structure, half_hessian
 from walking_irl.domains.humanoid.optimiser.linearisation import Linearisation
-from walking_irl.domains.humanoid.optimiser.newton import UNDAMPED, Newton, State, Status
+from walking_irl.domains.humanoid.optimiser.newton import UNDAMPED, Model, Newton, State, Status
 from walking_irl.domains.humanoid.optimiser.perturbation import perturb
+from walking_irl.domains.humanoid.optimiser.ring import Factor
 from walking_irl.domains.humanoid.optimiser.stages import DIRECT, TETHERS, Stage, nearby
 from walking_irl.domains.humanoid.optimiser.transcription import ROOT_PENALTY, Transcription
 from walking_irl.errors import SolverError
@@ -46,6 +47,8 @@ class Solution:
         iterations: Iterations of all stages.
         status: How the last stage ended, at its best gait.
         root: Dual estimate of the root forces there, shape (N, n_root), or None.
+        model: If it converged, the quadratic model of the gait one Newton step before it, whose
+            decrement showed that.
     """
 
     x: Array
@@ -54,6 +57,7 @@ class Solution:
     iterations: int
     status: Status
     root: Array | None
+    model: Model | None = None
 
 
 class GaitSolver:
@@ -113,7 +117,7 @@ class GaitSolver:
             SolverError: If the cost of the start is not finite.
         """
         passed: list[Array] = []
-        anchor, iterations, status = x, 0, Status.CAPPED
+        anchor, iterations, status, model = x, 0, Status.CAPPED, None
         for s in stages:
             newton = Newton(self.structure, w, s, anchor, known=known, root=root)
 
@@ -123,9 +127,10 @@ class GaitSolver:
 
             at, n, status = self._stage(newton, x, passed, told)
             x, root, iterations = at.ev.x, newton.root, iterations + n
+            model = newton.last if status is Status.CONVERGED else None
         total = self.problem.evaluate(x).total_costs()
         many = np.array(passed).reshape(-1, len(total))
-        return Solution(x, total, many, iterations, status, root)
+        return Solution(x, total, many, iterations, status, root, model)
 
     def _stage(
         self, newton: Newton, x: Array, passed: list[Array], on_step: OnStep
@@ -194,15 +199,15 @@ class GaitSolver:
         is_exact = self.problem.dynamics.reason is None
         matrix = half_hessian(lin.at(w, ROOT_PENALTY), self.structure, root, is_exact=is_exact)
         try:
-            factor = matrix.factor(UNDAMPED)
+            return _sensitivity(w, lin, matrix.factor(UNDAMPED))
         except np.linalg.LinAlgError:
             return None
-        unit = np.eye(len(self.problem.stack.objectives))
-        g = np.column_stack([2 * lin.at(e, ROOT_PENALTY).gradient for e in unit])
-        y = factor.solve(g) / 2
-        m, total = g.T @ y, g @ w / 2
-        decrement = float(total @ (y @ w)) / lin.evaluation.total(w, ROOT_PENALTY)
-        return (m + m.T) / 2, -y, decrement
+
+    def sensitivity_of(self, w: Array, found: Solution) -> tuple[Array, Array, float] | None:
+        """:meth:`sensitivity` of a solution, at full penalty; reuses its model if it converged."""
+        if found.model is not None and found.model.undamped is not None:
+            return _sensitivity(w, found.model.here.lin, found.model.undamped)
+        return self.sensitivity(w, self.linearise(found.x), found.root)
 
     def decrement(self, w: Array, lin: Linearisation, root: Array | None = None) -> float:
         """Undamped relative Newton decrement of a gait; inf where the Hessian is indefinite."""
@@ -212,3 +217,12 @@ class GaitSolver:
     def perturb(self, x: Array, amplitude: float, rng: np.random.Generator) -> Array:
         """See :func:`~.perturbation.perturb`."""
         return perturb(self.problem.walker, x, amplitude, rng)
+
+
+def _sensitivity(w: Array, lin: Linearisation, factor: Factor) -> tuple[Array, Array, float]:
+    unit = np.eye(len(lin.stack.objectives))
+    g = np.column_stack([2 * lin.at(e, ROOT_PENALTY).gradient for e in unit])
+    y = factor.solve(g) / 2
+    m, total = g.T @ y, g @ w / 2
+    decrement = float(total @ (y @ w)) / lin.evaluation.total(w, ROOT_PENALTY)
+    return (m + m.T) / 2, -y, decrement
