@@ -3,7 +3,8 @@
 Newton's method finds the minimum of a basin at once, so the price is the search for the basin: from
 the known gaits that are cheapest under the weights, from the reference, and from hops off the
 best, all at a low root penalty; the best basins go to the full one. A still lower penalty first
-lets a gait leave its basin for a better one, or a worse one: both are tried. An optimum that is no
+lets a gait leave its basin for a better one, or a worse one: both are tried. Detours over the
+optimal gaits of neighbouring weights then find what a learner would find. An optimum that is no
 smooth minimum sits on a contact jump: it is perturbed and solved again.
 """
 
@@ -26,11 +27,17 @@ APPROACH = (stage(1e4, 25, 1e-5),)
 SOFTLY = (stage(1e3, 25, 1e-4), *APPROACH)
 """From a gait of other weights, first through a penalty at which it may leave its basin."""
 FINISH = (stage(1e6, 60, 1e-11),)
+THERE, BACK = (stage(1e6, 15, 1e-4),), (stage(1e6, 25, 1e-6),)
+"""A detour to a gait of neighbouring weights, and back: roughly, only the best is finished."""
 NEAREST = 4
 """Known gaits from which a search starts softly, the cheapest under the weights; the first of them
 and the reference also keep their basins."""
 HOPS = 2
 HOP = np.deg2rad(1.0)
+DETOUR = 0.1
+"""How far detours go towards each corner of the simplex."""
+MAX_DETOURS = 3
+"""Rounds of detours, as long as one finds a better gait."""
 BASINS = 3
 """Most basins that are taken to the full root penalty."""
 FINISH_HOPS = tuple(np.deg2rad([[0.005, 0.1], [0.3, 1.0], [0.1, 0.3]]).tolist())
@@ -79,6 +86,15 @@ class _Search:
         self.iterations += sum(s.iterations for s in found)
         return found
 
+    def detours(self, s: Solution) -> list[Solution]:
+        """Solutions from the optimal gaits of weights nearer to each corner of the simplex."""
+        others = [self.w + DETOUR * (e - self.w) for e in np.eye(len(self.w))]
+        tasks = [(self.spec, self.w, other, s.x, s.root) for other in others]
+        found: list[Solution] = run_tasks(_detour, tasks, self.executor)
+        self.starts += 2 * len(found)
+        self.iterations += sum(f.iterations for f in found)
+        return found
+
     def search_cost(self, s: Solution) -> float:
         return self.solver.problem.evaluate(s.x).total(self.w, APPROACH[0].penalty)
 
@@ -118,10 +134,24 @@ def best_gait(
     hops: list[Job] = [(job.hop(found[0], HOP, r), APPROACH, None) for r in rng.spawn(HOPS)]
     found = sorted(found + job.run(hops), key=job.search_cost)
     raised = job.run([(s.x, FINISH, s.root) for s in _basins(found, job)])
+    for _ in range(MAX_DETOURS):
+        best = min(raised, key=job.cost)
+        other = min(job.detours(best), key=job.cost)
+        if not job.cost(other) < job.cost(best) * (1 - SAME_BASIN):
+            break
+        raised += job.run([(other.x, FINISH, other.root)])
     chosen = _finish(job, raised, rng)
     return OptimalGait(
         chosen.x, chosen.total_costs, job.decrement(chosen), job.starts, job.iterations
     )
+
+
+def _detour(spec: WalkerSpec, w: Array, other: Array, x: Array, root: Array | None) -> Solution:
+    """Best gait for ``w`` from that for other weights, as a function for a process pool."""
+    there = polish(spec, other, x, THERE, root)
+    back = polish(spec, w, there.x, BACK, there.root)
+    back.iterations += there.iterations
+    return back
 
 
 def _finish(job: _Search, found: list[Solution], rng: np.random.Generator) -> Solution:
