@@ -24,14 +24,16 @@ from walking_irl.domains.humanoid import domain as domain_module
 from walking_irl.domains.humanoid.closed_loop.trials import measure
 from walking_irl.domains.humanoid.domain import Humanoid, exact_expert
 from walking_irl.domains.humanoid.gait.library import load_library
-from walking_irl.domains.humanoid.optimiser import descent
+from walking_irl.domains.humanoid.optimiser import newton
 from walking_irl.domains.humanoid.optimiser.linearisation import Linearisation, Weighted
-from walking_irl.domains.humanoid.optimiser.normal_equations import Factor, NormalMatrix
+from walking_irl.domains.humanoid.optimiser.ring import BorderedMatrix, Factor
 from walking_irl.domains.humanoid.optimiser.transcription import Transcription
 from walking_irl.run.session import PROBE
 from walking_irl.types import Expert, Iteration
 
-DERIVATIVES = "MuJoCo's inverse dynamics and derivatives"
+EVALUATIONS = "MuJoCo's inverse dynamics"
+DERIVATIVES = "first derivatives of inverse dynamics"
+HESSIANS = "Hessians"
 ALGEBRA = "linear algebra of the gait solver"
 REST = "rest of the gait solver"
 MEASURE = "closed-loop walks and their policies"
@@ -79,9 +81,10 @@ class Clock:
 def timers(clock: Clock) -> Iterator[None]:
     """Wrap the parts of the gait solver."""
     wrapped: list[tuple[Any, str, str]] = [
-        (Transcription, "_over_knots", DERIVATIVES),
-        (descent, "normal_matrix", ALGEBRA),
-        (NormalMatrix, "factor", ALGEBRA),
+        (Transcription, "_over_knots", EVALUATIONS),
+        (Transcription, "differentiate", DERIVATIVES),
+        (newton, "half_hessian", HESSIANS),
+        (BorderedMatrix, "factor", ALGEBRA),
         (Factor, "solve", ALGEBRA),
         (Linearisation, "__init__", ALGEBRA),
         (Weighted, "times", ALGEBRA),
@@ -135,7 +138,7 @@ def recover(
 def report(expert: Clock, learner: Clock, steps: list[Iteration]) -> str:
     totals = [sum(clock.seconds.values()) for clock in (expert, learner)]
     rows = []
-    for part in (DERIVATIVES, ALGEBRA, REST, MEASURE, QUERIES):
+    for part in (EVALUATIONS, DERIVATIVES, HESSIANS, ALGEBRA, REST, MEASURE, QUERIES):
         own = [clock.seconds[part] for clock in (expert, learner)]
         rows.append([part, *(f"{t:.2f}" for t in own), f"{sum(own) / sum(totals):.1%}"])
     rows.append(["all", *(f"{t:.2f}" for t in totals), "100.0%"])

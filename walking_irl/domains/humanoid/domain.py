@@ -224,7 +224,7 @@ class Humanoid:
     ) -> Learner:
         """A solver that starts from the demonstrated gait; it has the cores where a pool idles."""
         threads = 1 if executor is None else THREADS
-        forward = WarmStartSolver(expert.demonstration, self.spec, threads, on_step)
+        forward = WarmStartSolver(expert.demonstration, self.spec, threads, on_step, mu=expert.mu)
         if expert.covariance is None:
             return Learner(forward)
         trials = trials_of(settings(self.options, options, self.name))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from concurrent.futures import Executor
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -15,6 +16,7 @@ from walking_irl.domains.humanoid.body.load import SHIPPED
 from walking_irl.domains.humanoid.costs.defaults import DEFAULT_COSTS
 from walking_irl.domains.humanoid.gait.gait import Gait
 from walking_irl.domains.humanoid.gait.library import load_library
+from walking_irl.domains.humanoid.optimiser.newton import FAR, Status
 from walking_irl.domains.humanoid.optimiser.solver import SMOOTH_DECREMENT, GaitSolver, Solution
 from walking_irl.domains.humanoid.optimiser.stages import DIRECT, LADDER, Stage
 from walking_irl.domains.humanoid.optimiser.transcription import Transcription
@@ -24,8 +26,8 @@ from walking_irl.errors import SolverError
 from walking_irl.types import Response
 from walking_irl.workers import run_tasks
 
-NUDGE = np.deg2rad(0.005)
-"""Learners start this far from the demonstration, so as not to sit on its contact jump."""
+WORTH = 0.05
+"""Regret above which an answer's sensitivity is not worth its price."""
 SAME_COST = 2e-5
 """A solve that ends worse than a known gait by more than this is repeated from that gait."""
 KNOWN_STARTS = 3
@@ -65,30 +67,45 @@ def check_weights(w: Array, spec: WalkerSpec = HUMANOID) -> Array:
     return normalised(w, spec.stack.objectives)
 
 
-def polish(spec: WalkerSpec, w: Array, x: Array, stages: Sequence[Stage]) -> Solution:
-    """One solve, as a function that a process pool can call."""
-    return solver_for(spec).solve(w, x, stages)
+def polish(
+    spec: WalkerSpec, w: Array, x: Array, stages: Sequence[Stage], root: Array | None = None
+) -> Solution:
+    """One solve, as a function that a process pool can call; see :meth:`.GaitSolver.solve`."""
+    return replace(solver_for(spec).solve(w, x, stages, root=root), model=None)
 
 
-def respond(solver: GaitSolver, w: Array, best: Solution, others: Iterable[Solution]) -> Response:
-    """The answer to a query: the best gait, and all gaits that were evaluated on the way."""
-    lin = solver.linearise(best.x)
-    decrement = solver.decrement(w, lin)
-    is_smooth = decrement < SMOOTH_DECREMENT
+def respond(
+    solver: GaitSolver,
+    w: Array,
+    best: Solution,
+    others: Iterable[Solution] = (),
+    is_wanted: bool = True,
+) -> Response:
+    """The answer to a query: the best gait, and all gaits that were evaluated on the way.
+
+    Its sensitivity comes along if it is wanted and the gait is a smooth minimum.
+    """
+    k = len(best.total_costs)
     everything = [best, *others]
-    passed = np.vstack([p for s in everything for p in (s.passed, s.total_costs[None])])
+    passed = np.vstack([p for s in everything for p in (s.passed.reshape(-1, k), s.total_costs)])
+    info = {
+        "iterations": sum(s.iterations for s in everything),
+        "starts": len(everything),
+        "status": best.status.name.lower(),
+        "is_stalled": best.status in (Status.STUCK, Status.CAPPED),
+    }
+    sensitivity = None
+    if is_wanted:
+        found = solver.sensitivity_of(w, best)
+        info["decrement"] = np.inf if found is None else found[2]
+        if found is not None and found[2] < SMOOTH_DECREMENT:
+            sensitivity = found[0]
     return Response(
         policy=Gait.from_vector(best.x, solver.problem.nv),
         mu=-best.total_costs,
-        sensitivity=solver.sensitivity(w, lin)[0] if is_smooth else None,
+        sensitivity=sensitivity,
         evaluated=-passed,
-        info={
-            "iterations": sum(s.iterations for s in everything),
-            "starts": len(everything),
-            "decrement": decrement,
-            "root_residual": float(np.abs(lin.evaluation.root).max()),
-            "is_stalled": best.is_stalled,
-        },
+        info=info,
     )
 
 
@@ -102,7 +119,8 @@ def search(
     """
     w = check_weights(w, spec)
     near = sorted(known_gaits(spec), key=lambda s: float(s.total_costs @ w))[:starts]
-    solutions = run_tasks(polish, [(spec, w, s.x, LADDER) for s in near], executor)
+    dual = solver_for(spec).dual
+    solutions = run_tasks(polish, [(spec, w, s.x, LADDER, dual(s.x)) for s in near], executor)
     solutions.sort(key=lambda s: float(s.total_costs @ w))
     if not np.isfinite(solutions[0].total_costs).all():
         raise SolverError(f"no gait found for weights {w.round(4).tolist()} from {starts} starts")
@@ -113,14 +131,22 @@ class WarmStartSolver:
     """The learner's forward solver: it sees a demonstrated gait and starts from there.
 
     Starting elsewhere may end in another basin than the expert's, whose worse gaits would not cut.
-    The answers depend on the queries so far only through the gaits found: a solve that ends worse
-    than a known gait is repeated from that gait.
+    A demonstration that no body could walk, like the mean of recorded cycles, is made physical
+    first. The answers depend on the queries so far only through the gaits found: a solve that ends
+    worse than a known gait is repeated from that gait.
 
     Args:
         demonstration: Demonstrated gait.
         spec: Which body, and its costs.
         threads: Threads of one solve.
         on_step: Told of every iteration of a solve in this process: its number and the cost.
+        mu: Demonstrated feature expectations, shape (K,); None: those of the gait itself.
+
+    Attributes:
+        start: Gait vector from which queries start.
+        demonstrated: Total costs G of the start, shape (K,).
+        known: Costs that an answer must beat to cut, -mu.
+        found: The answers so far.
     """
 
     def __init__(
@@ -129,11 +155,15 @@ class WarmStartSolver:
         spec: WalkerSpec = HUMANOID,
         threads: int = 1,
         on_step: OnStep | None = None,
+        *,
+        mu: Array | None = None,
     ) -> None:
         self.spec, self.threads, self.on_step = spec, threads, on_step
-        self.start = demonstration.to_vector()
-        solver = solver_for(spec, threads)
+        solver, self.start = solver_for(spec, threads), demonstration.to_vector()
+        self.start = solver.physical(self.start)
         self.demonstrated = solver.problem.evaluate(self.start).total_costs()
+        self.known = self.demonstrated if mu is None else -np.asarray(mu)
+        self.root = solver.dual(self.start)
         self.found: list[Start] = []
 
     def __getstate__(self) -> dict[str, Any]:
@@ -143,25 +173,37 @@ class WarmStartSolver:
     def __call__(self, w: Array) -> Response:
         """Best gait for weights ``w`` near the demonstration."""
         solver = solver_for(self.spec, self.threads)
-        seed = [int(v) for v in np.round(np.asarray(w) * 1e9)]
-        start = solver.perturb(self.start, NUDGE, np.random.default_rng(seed))
-        solutions = [solver.solve(w, start, DIRECT, self.on_step)]
-        better = self._better_start(w, float(solutions[0].total_costs @ w))
+        known = float(self.known @ w)
+        solutions = [self._solve(w, self.start, self.root, known)]
+        better = self._better_start(w, float(solutions[0].total_costs @ w), known)
         if better is not None:
-            solutions.append(solver.solve(w, better, DIRECT, self.on_step))
+            solutions.append(self._solve(w, better, solver.dual(better), known))
         solutions.sort(key=lambda s: float(s.total_costs @ w))
         best = solutions[0]
         self.found.append(Start(best.x, best.total_costs))
-        return respond(solver, w, best, solutions[1:])
+        cost = float(best.total_costs @ w)
+        if self.demonstrated @ w < cost * (1 - 1e-9):
+            best = Solution(
+                self.start,
+                self.demonstrated,
+                best.passed,
+                best.iterations,
+                Status.STUCK,
+                self.root,
+            )
+        return respond(solver, w, best, solutions[1:], known < cost * (1 + WORTH))
+
+    def _solve(self, w: Array, x: Array, root: Array | None, known: float) -> Solution:
+        solver = solver_for(self.spec, self.threads)
+        return solver.solve(w, x, DIRECT, known=known, root=root, on_step=self.on_step)
 
     def recall(self, response: Response) -> None:
         """Learn of an answer that another run has found."""
         self.found.append(Start(response.policy.to_vector(), -response.mu))
 
-    def _better_start(self, w: Array, cost: float) -> Array | None:
-        if self.demonstrated @ w < cost * (1 - 1e-9):
-            return self.start
-        best = min(self.found, key=lambda known: float(known.total_costs @ w), default=None)
-        if best is None or not float(best.total_costs @ w) < cost * (1 - SAME_COST):
+    def _better_start(self, w: Array, cost: float, known: float) -> Array | None:
+        """A gait found before that is cheaper than a new answer, where the answer cuts little."""
+        best = min(self.found, key=lambda s: float(s.total_costs @ w), default=None)
+        if best is None or known > cost * (1 + FAR):
             return None
-        return best.x
+        return best.x if float(best.total_costs @ w) < cost * (1 - SAME_COST) else None

@@ -36,4 +36,9 @@ class Effort(Cost):
         def residual(tau: Any) -> Any:
             return tau * (mean + half * np.tanh(tau / self.switch))
 
-        return [Term((read_joints(walker, "tau"),), residual)]
+        def second(tau: Any) -> dict[tuple[int, int], Any]:
+            th = np.tanh(tau / self.switch)
+            slope = (1 - th * th) / self.switch
+            return {(0, 0): 2 * half * slope * (1 - tau * th / self.switch)}
+
+        return [Term((read_joints(walker, "tau"),), residual, second=second)]

@@ -48,7 +48,23 @@ class Skid(SharedCost):
             read_sensors(walker, "s", z),
             H,
         )
-        return [Term(reads, residual)]
+        return [Term(reads, residual, second=self.second)]
+
+    def second(self, x: Any, x_next: Any, z: Any, h: Any) -> dict[tuple[int, int], Any]:
+        """Second partial derivatives of the residual."""
+        down = self.contact(z)
+        slope = -down * (1 - down) / self.width
+        bend = -slope * (1 - 2 * down) / self.width
+        moved, unit = x_next - x, 1 / (h * self.speed)
+        return {
+            (0, 2): -unit * slope,
+            (1, 2): unit * slope,
+            (0, 3): unit * down / h,
+            (1, 3): -unit * down / h,
+            (2, 2): unit * moved * bend,
+            (2, 3): -unit * moved * slope / h,
+            (3, 3): 2 * unit * moved * down / (h * h),
+        }
 
     def contact(self, z: Any) -> Any:
         """How far a point at height ``z`` [m] counts as down: 1 on the ground, 0 in the air."""

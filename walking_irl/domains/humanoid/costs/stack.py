@@ -147,8 +147,12 @@ class CostStack:
         for place in self.places:
             shape = (len(c.q), place.columns.stop - place.columns.start)
             reads = _reads(place, c)
-            if place.term.is_linear or not reads:
-                blocks.append(np.zeros((len(reads), len(reads), *shape)))
+            if place.term.is_linear or not reads or place.term.second is not None:
+                block = np.zeros((len(reads), len(reads), *shape))
+                found = place.term.second(*reads) if place.term.second is not None else {}
+                for (p, o), value in found.items():
+                    block[p, o] = block[o, p] = value
+                blocks.append(block)
                 continue
             sizes = [self._size(*r) for r in place.term.reads]
             blocks.append(second_partials(place.term.residual, reads, sizes, shape))

@@ -36,7 +36,7 @@ class Work(Cost):
         """Two residuals a motor: at the start and at the end of a step."""
         tau = read_joints(walker, "tau")
         return [
-            Term((tau, read_joints(walker, velocity)), self.residual)
+            Term((tau, read_joints(walker, velocity)), self.residual, second=self.second)
             for velocity in ("v", "v_next")
         ]
 
@@ -44,3 +44,12 @@ class Work(Cost):
         """Signed root of about half the absolute power in its unit, smooth through zero."""
         p = tau * v
         return np.sqrt(0.5 / self.power) * p / np.sqrt(np.sqrt(p * p + self.smoothing**2))
+
+    def second(self, tau: Any, v: Any) -> dict[tuple[int, int], Any]:
+        """Second partial derivatives of :meth:`residual`."""
+        p = tau * v
+        s = p * p + self.smoothing**2
+        root = np.sqrt(0.5 / self.power) / np.sqrt(np.sqrt(s))
+        slope = root * (1 - 0.5 * p * p / s)
+        bend = root * p / s * (1.25 * p * p / s - 1.5)
+        return {(0, 0): bend * v * v, (1, 1): bend * tau * tau, (0, 1): slope + bend * p}

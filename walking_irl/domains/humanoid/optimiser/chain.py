@@ -2,8 +2,7 @@ r"""How the channels of a gait's steps change with its unknowns: knots, step len
 
 Positions give velocities and accelerations by differences, these give torques, root forces and
 sensor readings by inverse dynamics, and the step after the last one is the mirror image of the
-first. ``forward`` and ``backward`` are the products with that Jacobian and its transpose;
-``rows`` are its dense part, chained onto windows of three knots.
+first. ``forward`` and ``backward`` are the products with that Jacobian and its transpose.
 """
 
 from __future__ import annotations
@@ -12,13 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from walking_irl.arrays import Array, Indices
+from walking_irl.arrays import Array
 from walking_irl.domains.humanoid.costs.base import Channels
-from walking_irl.domains.humanoid.optimiser.transcription import (
-    Derivatives,
-    Evaluation,
-    Transcription,
-)
+from walking_irl.domains.humanoid.optimiser.dynamics.inverse import Derivatives
+from walking_irl.domains.humanoid.optimiser.transcription import Evaluation, Transcription
 
 
 class Outputs(NamedTuple):
@@ -31,6 +27,18 @@ class Outputs(NamedTuple):
     """Forward distance of the feet at mid-step [m]."""
 
 
+class Multipliers(NamedTuple):
+    """A gradient of outputs, by knots: the step after a knot's is folded onto it."""
+
+    outputs: Array
+    """Of root forces in their units, torques and the sensors read, shape (N, R)."""
+    coordinates: Array
+    """Of q, v and a at fixed outputs, shape (N, 3 nv)."""
+    h: float
+    length: float
+    """Of the duration of a step and of the step length, at fixed outputs and coordinates."""
+
+
 class Chain:
     """Derivatives of the outputs of a gait with respect to its unknowns, shape (N nv + 2,).
 
@@ -38,30 +46,22 @@ class Chain:
         problem: The transcription.
         ev: The gait.
         d: Derivatives of inverse dynamics at its knots.
-        sensors: Columns of the sensor readings that matter.
 
     Attributes:
-        inputs: Derivatives of root forces, torques and those sensors with respect to q, v and a,
-            input first: shape (N, 3 nv, n_root + nu + n_sensors).
-        sensors: The columns read, increasing.
+        rows: Derivatives of root forces in their units, torques and the sensors of
+            ``problem.sensors`` with respect to q, v and a: shape (N, R, 3 nv).
     """
 
-    def __init__(
-        self, problem: Transcription, ev: Evaluation, d: Derivatives, sensors: Indices
-    ) -> None:
+    def __init__(self, problem: Transcription, ev: Evaluation, d: Derivatives) -> None:
         self.problem, self.evaluation = problem, ev
-        self.sensors = np.union1d(sensors, problem.feet)
-        self.feet = np.searchsorted(self.sensors, problem.feet)
-        n_root = problem.walker.n_root
-        self.inputs = np.empty(
-            (problem.n_knots, 3 * problem.nv, problem.nv + len(self.sensors)), dtype=float
-        )
-        parts = ((d.force_q, d.sensor_q), (d.force_v, d.sensor_v), (d.force_a, d.sensor_a))
+        nv, sensors = problem.nv, problem.sensors
+        self.feet = np.searchsorted(sensors, problem.feet)
+        self.rows = np.empty((problem.n_knots, nv + len(sensors), 3 * nv))
+        parts = ((d.tau_q, d.s_q), (d.tau_v, d.s_v), (d.tau_a, d.s_a))
         for b, (force, sensor) in enumerate(parts):
-            block = self.inputs[:, b * problem.nv : (b + 1) * problem.nv]
-            block[..., : problem.nv] = force
-            block[..., problem.nv :] = sensor[..., self.sensors]
-        self.inputs[..., :n_root] /= problem.root_unit
+            self.rows[:, :nv, b * nv : (b + 1) * nv] = force
+            self.rows[:, nv:, b * nv : (b + 1) * nv] = sensor[:, sensors]
+        self.rows[:, : problem.walker.n_root] /= problem.root_unit[:, None]
 
     def forward(self, dx: Array) -> Outputs:
         """Change of the outputs for a change ``dx`` of the unknowns."""
@@ -75,9 +75,9 @@ class Chain:
         v = np.vstack([m.v, m.v_next[-1:]])
         dv = np.diff(np.vstack([before, dq, after]), axis=0) / h - v * (dh / h)
         da = np.diff(dv, axis=0) / h - m.a * (dh / h)
-        out = np.matmul(np.hstack([dq, dv[:-1], da])[:, None], self.inputs)[:, 0]
+        out = (self.rows @ np.hstack([dq, dv[:-1], da])[..., None])[..., 0]
         tau, s = out[:, walker.n_root : nv], np.zeros_like(m.s)
-        s[:, self.sensors] = out[:, nv:]
+        s[:, p.sensors] = out[:, nv:]
         tau_last = walker.torque_mirror @ tau[0]
         s_last = walker.sensor_mirror @ s[0] + walker.sensor_advance * d_length
         channels = Channels(
@@ -95,49 +95,43 @@ class Chain:
         left, right = s[n // 2, p.feet]
         return Outputs(channels, out[:, : walker.n_root], float(left - right))
 
-    def backward(self, y: Outputs) -> Array:
-        """Gradient with respect to the unknowns of ``y`` . outputs, shape (N nv + 2,)."""
+    def fold(self, y: Outputs) -> Multipliers:
+        """The gradient ``y`` of all outputs by knots."""
         p, m, c = self.problem, self.evaluation.motion, y.channels
-        walker, n, nv, h = p.walker, p.n_knots, p.nv, m.h
+        walker, n = p.walker, p.n_knots
         tau, s = c.tau.copy(), c.s.copy()
         tau[1:] += c.tau_next[:-1]
         tau[0] += walker.torque_mirror.T @ c.tau_next[-1]
         s[1:] += c.s_next[:-1]
         s[0] += walker.sensor_mirror.T @ c.s_next[-1]
-        d_length = float(walker.sensor_advance @ c.s_next[-1])
         s[n // 2, p.feet] += [y.align, -y.align]
-        outputs = np.hstack([y.root, tau, s[:, self.sensors]])
-        by_input = np.matmul(self.inputs, outputs[..., None])[..., 0]
-        a = c.a + by_input[:, 2 * nv :]
+        return Multipliers(
+            outputs=np.hstack([y.root, tau, s[:, p.sensors]]),
+            coordinates=np.hstack([c.q, c.v + c.v_next, c.a + m.h * c.v_next]),
+            h=c.h + float(np.vdot(c.v_next, m.a)),  # v_next = v + h a
+            length=float(walker.sensor_advance @ c.s_next[-1]),
+        )
+
+    def by_coordinates(self, y: Multipliers) -> Array:
+        """Gradient with respect to q, v and a of every knot, shape (N, 3 nv)."""
+        return np.asarray(y.coordinates + (y.outputs[:, None] @ self.rows)[:, 0])
+
+    def backward(self, y: Outputs) -> Array:
+        """Gradient with respect to the unknowns of ``y`` . outputs, shape (N nv + 2,)."""
+        p, m = self.problem, self.evaluation.motion
+        n, nv, h, mirror = p.n_knots, p.nv, m.h, p.walker.mirror
+        folded = self.fold(y)
+        u = self.by_coordinates(folded)
+        by_v, a = u[:, nv : 2 * nv], u[:, 2 * nv :]
+        dh = folded.h - (float(np.vdot(by_v, m.v)) + 2 * float(np.vdot(a, m.a))) / h
         v = np.zeros((n + 1, nv))
-        v[:-1] = c.v + by_input[:, nv : 2 * nv] - a / h
-        v[1:] += c.v_next + a / h
-        dh = c.h - float(np.vdot(a, m.a)) / h
-        dh -= (float(np.vdot(v[:-1], m.v)) + float(v[-1] @ m.v_next[-1])) / h
+        v[:-1] = by_v - a / h
+        v[1:] += a / h
         ring = np.zeros((n + 2, nv))
         ring[1:] = v / h
         ring[:-1] -= v / h
-        q = c.q + by_input[:, :nv] + ring[1:-1]
-        q[-1] += walker.mirror.T @ ring[0]
-        q[0] += walker.mirror.T @ ring[-1]
-        d_length += ring[-1, 0] - ring[0, 0]
+        q = u[:, :nv] + ring[1:-1]
+        q[-1] += mirror.T @ ring[0]
+        q[0] += mirror.T @ ring[-1]
+        d_length = folded.length + float(ring[-1, 0] - ring[0, 0])
         return np.concatenate([q.ravel(), [d_length, dh / n]])
-
-    def rows(self) -> Array:
-        """Root forces, torques and sensors with respect to knots i - 1, i, i + 1 and T.
-
-        Returns:
-            Shape (N, n_root + nu + n_sensors, 3 nv + 1).
-        """
-        m, nv = self.evaluation.motion, self.problem.nv
-        h, n = m.h, len(m.q)
-        dq = self.inputs[:, :nv]
-        dv, da = self.inputs[:, nv : 2 * nv] / h, self.inputs[:, 2 * nv :] / (h * h)
-        out = np.empty((n, self.inputs.shape[2], 3 * nv + 1))
-        out[:, :, :nv] = np.swapaxes(da - dv, 1, 2)
-        out[:, :, nv : 2 * nv] = np.swapaxes(dq + dv - 2 * da, 1, 2)
-        out[:, :, 2 * nv : -1] = np.swapaxes(da, 1, 2)
-        by_v = np.matmul(m.v[:, None, :], dv)[:, 0]
-        by_a = np.matmul(m.a[:, None, :], da)[:, 0]
-        out[:, :, -1] = -(by_v + 2 * h * by_a) / n
-        return out

@@ -20,7 +20,6 @@ from walking_irl.domains.humanoid.costs.stack import CostStack
 from walking_irl.domains.humanoid.optimiser.chain import Chain, Outputs
 from walking_irl.domains.humanoid.optimiser.transcription import (
     ANCHOR_WEIGHTS,
-    Derivatives,
     Evaluation,
     Transcription,
 )
@@ -73,49 +72,28 @@ class Linearisation:
         problem: The transcription.
         evaluation: The gait.
         stack: Its costs.
+        derivatives: Of inverse dynamics at its knots.
         chain: Derivatives of the channels with respect to the unknowns.
         partials: Derivatives of the residuals with respect to the channels.
         log_scale: u, the gradient of log s with respect to (L, T).
     """
 
-    def __init__(self, problem: Transcription, ev: Evaluation, d: Derivatives) -> None:
+    def __init__(self, problem: Transcription, ev: Evaluation) -> None:
         self.problem, self.evaluation, self.stack = problem, ev, problem.stack
-        self.chain = Chain(problem, ev, d, problem.stack.sensors)
+        self.derivatives = problem.differentiate(ev)
+        self.chain = Chain(problem, ev, self.derivatives)
         self.partials = problem.stack.first(ev.motion)
         self.log_scale = np.array([-0.5 / ev.x[-2], 0.5 / ev.x[-1]])
-        self._local: dict[str, Array] = {}
         self.is_period_out = float(ev.anchors[2] != 0)
+
+    @cached_property
+    def second(self) -> tuple[Array, ...]:
+        """Second partial derivatives of all residuals by term; see :meth:`.CostStack.second`."""
+        return self.stack.second(self.evaluation.motion)
 
     def at(self, w: Array, penalty: float) -> Weighted:
         """The residuals and their Jacobian at weights ``w``, shape (K,), and a root penalty."""
         return Weighted(self, w, penalty)
-
-    @cached_property
-    def rows(self) -> Array:
-        """See :meth:`.chain.Chain.rows`."""
-        return self.chain.rows()
-
-    def local(self, channel: str) -> Array:
-        """Derivatives of q, v, v_next, a or h at each joint by itself at i - 1, i, i + 1 and by T.
-
-        Returns:
-            Shape (N, nv, 4).
-        """
-        if channel in self._local:
-            return self._local[channel]
-        m = self.evaluation.motion
-        h, n = m.h, len(m.q)
-        by_knot, by_period = {
-            "q": ([0.0, 1.0, 0.0], 0.0),
-            "v": ([-1 / h, 1 / h, 0.0], -m.v / (h * n)),
-            "v_next": ([0.0, -1 / h, 1 / h], -m.v_next / (h * n)),
-            "a": ([1 / h**2, -2 / h**2, 1 / h**2], -2 * m.a / (h * n)),
-            "h": ([0.0, 0.0, 0.0], 1 / n),
-        }[channel]
-        out = np.empty((*m.q.shape, 4))
-        out[..., :3], out[..., 3] = by_knot, by_period
-        self._local[channel] = out
-        return out
 
 
 class Weighted:

@@ -13,9 +13,9 @@ class Stage(NamedTuple):
     penalty: float
     max_iter: int
     tol: float
-    """Relative decrease of the cost that counts as none; three in a row end the stage."""
+    """Relative Newton decrement at which a gait counts as a minimum."""
     tether: float = 0.0
-    """Weight of the squared distance from the start of the solve, for starts that do not walk."""
+    """Weight of the squared distance from the start of the solve, per unknown."""
 
 
 def stage(raw_penalty: float, max_iter: int, tol: float, tether: float = 0.0) -> Stage:
@@ -23,7 +23,15 @@ def stage(raw_penalty: float, max_iter: int, tol: float, tether: float = 0.0) ->
     return Stage(ROOT_PENALTY * raw_penalty / 1e6, max_iter, tol, tether)
 
 
-DIRECT = (stage(1e6, 150, 1e-7),)
+DIRECT = (stage(1e6, 40, 1e-10),)
 """From a gait of similar weights."""
-LADDER = (stage(1e4, 100, 1e-5), stage(1e5, 60, 1e-5), stage(1e6, 150, 1e-6))
+LADDER = (stage(1e4, 25, 1e-5), stage(1e6, 60, 1e-10))
 """From a gait of other weights."""
+TETHERS = (1e5, 1e3, 1e1, 1e-1)
+"""To be tried in turn until the tethered gait is physical: the first holds the mean of recorded
+cycles, whose deviations are small, the last a gait that was perturbed by degrees."""
+
+
+def nearby(tether: float) -> tuple[Stage, ...]:
+    """To a physical gait near the start, whatever it costs; its root forces are what is left."""
+    return tuple(stage(p, 12, 1e-4, tether) for p in (1e4, 1e5, 1e6))

@@ -7,8 +7,8 @@ act on the unactuated root; those are penalised away:
 .. math:: \min_x \; w \cdot G(x), \qquad G_j = F_j/\text{scale}_j + C + \rho \, |f_\text{root}|^2
 
 T. Erez, E. Todorov (2012), Trajectory optimization for domains with contacts using inverse
-dynamics. The derivatives of inverse dynamics are MuJoCo's (``mjd_inverseFD``); everything else is
-chained by hand onto windows of four knots (:mod:`~.normal_equations`).
+dynamics. The derivatives of inverse dynamics are closed forms (:mod:`~.dynamics`), chained onto
+the unknowns by :mod:`~.chain` and, for second derivatives, :mod:`~.hessian`.
 """
 
 from __future__ import annotations
@@ -19,12 +19,13 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from walking_irl.arrays import Array
+from walking_irl.arrays import Array, Indices
 from walking_irl.domains.humanoid.body.anatomy import Walker
 from walking_irl.domains.humanoid.costs.base import Channels
 from walking_irl.domains.humanoid.costs.defaults import DEFAULT_COSTS, UNIT, Costs
 from walking_irl.domains.humanoid.costs.stack import cost_stack
 from walking_irl.domains.humanoid.gait.gait import Gait
+from walking_irl.domains.humanoid.optimiser.dynamics.inverse import Derivatives, InverseDynamics
 
 ROOT_PENALTY = 1e6 / UNIT
 """rho; leaves root forces of about 1e-5 body weights, so that the gait can be simulated."""
@@ -59,20 +60,6 @@ class Evaluation(NamedTuple):
         return float(w @ self.objective_costs + self.shared + penalty * self.root_square)
 
 
-class Derivatives(NamedTuple):
-    """Derivatives of inverse dynamics at every knot, input first.
-
-    ``force_*`` has shape (N, nv, nv), ``sensor_*`` (N, nv, ns); the suffix names the input.
-    """
-
-    force_q: Array
-    force_v: Array
-    force_a: Array
-    sensor_q: Array
-    sensor_v: Array
-    sensor_a: Array
-
-
 class Transcription:
     """Evaluates gaits of a walker and the derivatives of its inverse dynamics.
 
@@ -101,12 +88,14 @@ class Transcription:
         self.root_unit = walker.weight * np.where(is_slide, 1.0, 0.5)
         self.motors = np.arange(walker.n_root, self.nv)
         self.feet = np.array([walker.sensor[f"ankle_{s}"].start for s in "lr"])
+        self.sensors: Indices = np.union1d(self.stack.sensors, self.feet)
         self._pool: ThreadPoolExecutor | None = None
         self._data: list[Any] = []
+        self._dynamics: InverseDynamics | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         """Everything but the scratch space of this process."""
-        return {**self.__dict__, "_pool": None, "_data": []}
+        return {**self.__dict__, "_pool": None, "_data": [], "_dynamics": None}
 
     def motion(self, x: Array) -> tuple[Array, Array, Array, Gait]:
         """Positions of the N knots, velocities of N + 1 and accelerations of N knots."""
@@ -120,22 +109,9 @@ class Transcription:
 
     def evaluate(self, x: Array) -> Evaluation:
         """Costs of the gait ``x``."""
-        return self._evaluate(x, None)[0]
-
-    def differentiate(self, x: Array, eps: float) -> tuple[Evaluation, Derivatives]:
-        """Costs of the gait ``x`` and finite differences of inverse dynamics with step ``eps``."""
-        evaluation, derivatives = self._evaluate(x, eps)
-        assert derivatives is not None
-        return evaluation, derivatives
-
-    def _evaluate(self, x: Array, eps: float | None) -> tuple[Evaluation, Derivatives | None]:
         q, v, a, gait = self.motion(x)
-        n, nv, ns = self.n_knots, self.nv, self.walker.model.nsensordata
-        force, sensor = np.empty((n, nv)), np.empty((n, ns))
-        d = None
-        if eps is not None:
-            shapes = [(n, nv, nv)] * 3 + [(n, nv, ns)] * 3
-            d = Derivatives(*(np.empty(shape) for shape in shapes))
+        force = np.empty((self.n_knots, self.nv))
+        sensor = np.empty((self.n_knots, self.walker.model.nsensordata))
 
         def work(knots: range, data: Any) -> None:
             model = self.walker.model
@@ -143,11 +119,20 @@ class Transcription:
                 data.qpos[:], data.qvel[:], data.qacc[:] = q[i], v[i], a[i]
                 mujoco.mj_inverse(model, data)
                 force[i], sensor[i] = data.qfrc_inverse, data.sensordata
-                if d is not None:
-                    mujoco.mjd_inverseFD(model, data, eps, False, *(field[i] for field in d), None)
 
         self._over_knots(work)
-        return self._assemble(x, q, v, a, gait, force, sensor), d
+        return self._assemble(x, q, v, a, gait, force, sensor)
+
+    @property
+    def dynamics(self) -> InverseDynamics:
+        """Differentiates inverse dynamics; its ``reason`` says whether there is a closed form."""
+        if self._dynamics is None:
+            self._dynamics = InverseDynamics(self.walker.model)
+        return self._dynamics
+
+    def differentiate(self, ev: Evaluation) -> Derivatives:
+        """Derivatives of inverse dynamics at all knots."""
+        return self.dynamics.at(ev.motion.q, ev.motion.v, ev.motion.a)
 
     def _over_knots(self, work: Any) -> None:
         if not self._data:
