@@ -25,7 +25,7 @@ from walking_irl.domains.lqr import LQR
 from walking_irl.errors import FallError, SolverError
 from walking_irl.recording.reader import inspect_recording
 
-COMMANDS = ("recover", "gait", "tables", "inspect", "view", "domains")
+COMMANDS = ("recover", "gait", "read", "tables", "inspect", "view", "domains")
 PLANAR = ("--domain", "humanoid-planar")
 RECOVER_KEYS = {
     "domain", "objectives", "centre", "mode", "seed", "w_expert", "w", "intervals",

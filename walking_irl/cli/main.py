@@ -1,4 +1,4 @@
-"""The command line: ``walking-irl recover | gait | tables | inspect | view | domains``.
+"""The command line: ``walking-irl recover | gait | read | tables | inspect | view | domains``.
 
 Exit codes: 0 done, 1 the method ended without success (it says why), 2 bad input or a failed write,
 130 interrupted (what was done so far is saved).
@@ -31,6 +31,7 @@ examples:
   walking-irl recover --weights 1,1,1,1,1,4    hidden weights of your own
   walking-irl recover --resume walking.archive.npz --max-solves 40
   walking-irl gait --weights 1,2,1,1,1,5 --png gait.png
+  walking-irl read trial1.mot trial2.mot       what a recording of a person says
   walking-irl inspect walking.rrd
   walking-irl view walking.rrd
 """
@@ -56,6 +57,7 @@ def build_parser() -> argparse.ArgumentParser:
     sub = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     _recover_parser(sub.add_parser("recover", help="recover the hidden weights of a walker"))
     _gait_parser(sub.add_parser("gait", help="solve for the best gait under given weights"))
+    import_module("walking_irl.cli.read").add_parser(sub)
     tables = sub.add_parser("tables", help="regenerate the thesis's tables and two more")
     tables.add_argument("names", nargs="+", metavar="TABLE", help="7.1 ... 7.12, fig7.1, or all")
     tables.add_argument("--seeds", type=int, help="hidden experts per cell")
