@@ -205,6 +205,18 @@ def test_gaps_jitter_and_repeated_times_are_named_and_do_not_matter(read, walk):
     assert any("repeat" in n for n in person.notes)
 
 
+@pytest.mark.parametrize("value", [np.inf, 1e300, -1e9])
+@pytest.mark.parametrize("name", ["pelvis_tx", "hip_flexion_l", "time"])
+def test_a_single_absurd_number_is_a_gap_or_refused(read, walk, name, value):
+    spoilt = {n: c.copy() for n, c in walk.items()}
+    spoilt[name][70] = value
+    try:
+        person = read(storage(spoilt))
+    except InvalidInputError:
+        return
+    assert legs_apart(person.gait, GAIT) < CUT
+
+
 def test_an_empty_column_counts_as_missing(read, walk):
     person = read(storage(with_gaps(walk, 0, 220, ["elbow_flex_r"])))
     assert "elbow_flex_r" in person.missing

@@ -26,6 +26,7 @@ HIPS_IN_PELVIS = np.array([-0.0635, -0.0723, 0.0])
 Z_TO_Y = Rotation.from_euler("X", -np.pi / 2)
 """Turns a laboratory whose z is up into OpenSim's."""
 HEIGHTS = (0.4, 1.6)  # of a pelvis above the floor [m]
+MOST_ANGLE, MOST_WAY = 100.0, 1e5  # [rad], [m]; more is a gap of the tracking
 BOBS = 0.3  # most that it does so [m]
 TURNING = np.deg2rad(12.0)  # [rad/s]
 STEADY = 0.85  # of the 90th percentile of the speed
@@ -80,15 +81,18 @@ def motion_of(c: Channels, walker: Walker, hips_height: float, size: float = 1.0
             q[:, at[f"{joint}_{side}"]] = c.angles.get(f"{angle}_{side}", zero)
     pelvis = _pelvis(c)
     path = np.column_stack([c.path.get(f"pelvis_t{a}", zero) for a in "xyz"])
+    is_near = np.abs(np.nan_to_num(path, nan=np.inf)) < MOST_WAY
+    path = np.where(is_near, path, np.nan)
     pelvis, path, has_height = _upright(pelvis, path, "pelvis_ty" in c.path, notes)
     root = pelvis.as_matrix()
     angles = Rotation.from_matrix(TO_MODEL @ root @ TO_MODEL.T).as_euler("ZXY")
-    is_whole = np.isfinite(q).all(1) & np.isfinite(path).all(1) & np.isfinite(c.time)
+    is_whole = np.isfinite(q).all(1) & is_near.all(1) & np.isfinite(c.time)
+    path = np.nan_to_num(path)  # gaps do not count
     q[:, 3:6] = np.column_stack([np.unwrap(angles[:, 0]), angles[:, 1:]])
     q[:, :3] = (path + size * pelvis.apply(HIPS_IN_PELVIS)) @ TO_MODEL.T
     q[:, [at[f"lumbar_{n}"] for n in ("flexion", "bend", "rotation")]] = _trunk(c, zero)
     for column in c.angles.values():
-        is_whole &= np.isfinite(column)
+        is_whole &= np.abs(np.nan_to_num(column, nan=np.inf)) < MOST_ANGLE
     has_path = "pelvis_tx" in c.path or "pelvis_tz" in c.path
     return Motion(c.time, q, has_height, has_path, is_whole, notes=tuple(notes))
 
@@ -152,6 +156,8 @@ def _upright(
 def _is_height(column: Array) -> bool:
     """Whether a coordinate of the pelvis stays where a height would."""
     low, high = HEIGHTS
+    if not np.isfinite(column).any():
+        return False
     spread = np.nanpercentile(column, 95) - np.nanpercentile(column, 5)
     return bool(low < np.nanmedian(column) < high and spread < BOBS)
 

@@ -26,7 +26,9 @@ MOST_HZ = 100.0
 GAP = 1.8  # times the usual time step
 UNEVEN = 0.2  # spread of time steps over the usual one
 LEAST_ROWS = 8
+SPARSE = 20  # times longer than its rows: a record of gaps
 TREADMILL = 0.25  # [m/s]
+LEAST_SCALE, MOST_SCALE = 0.4, 2.5
 SLOPE = 0.04
 PEOPLE = (0.8, 2.3)  # [m]
 
@@ -143,6 +145,11 @@ def _even(m: Motion) -> tuple[Motion, float, int]:
     rate, notes = 1 / usual, list(m.notes)
     gaps = int((~good).sum())
     t = m.time[good]
+    if t[-1] - t[0] > SPARSE * usual * len(m.time):
+        raise InvalidInputError(
+            f"times are not of one recording: {len(m.time)} rows, most {usual:.3g} s apart, span "
+            f"{t[-1] - t[0]:.3g} s"
+        )
     n = max(round((t[-1] - t[0]) * min(rate, MOST_HZ)), 1)
     even = np.linspace(t[0], t[-1], n + 1)
     is_whole = np.ones(len(even), dtype=bool)
@@ -198,7 +205,13 @@ def _scale(m: Motion, feet: Feet, is_own: bool, options: Options) -> float:
         return MODEL_HEIGHT / options.height
     if is_own or not m.has_height:
         return 1.0
-    return float(np.median(feet.below) / np.median(m.q[:, 2]))
+    scale = float(np.median(feet.below) / np.median(m.q[:, 2]))
+    if not LEAST_SCALE < scale < MOST_SCALE:
+        raise InvalidInputError(
+            f"hips at {np.median(m.q[:, 2]):.2f} m do not fit legs of {np.median(feet.below):.2f} "
+            "m: which unit has the pelvis's path? (--height states the size instead)"
+        )
+    return scale
 
 
 def _slope(q: Array, is_treadmill: bool) -> list[str]:
