@@ -29,11 +29,11 @@ from bench import table
 from walking_irl.arrays import Array
 from walking_irl.cpirl.loop import cpirl
 from walking_irl.cpirl.stopping import IntervalsNarrowerThan
-from walking_irl.domains.humanoid.closed_loop.trials import Protocol
+from walking_irl.domains.humanoid.closed_loop.trials import Trials
 from walking_irl.domains.humanoid.domain import Humanoid
-from walking_irl.domains.humanoid.gait.library import load_library
-from walking_irl.domains.humanoid.learner import solver_for
+from walking_irl.domains.humanoid.learner import known_gaits, solver_for
 from walking_irl.domains.humanoid.population import typical_weights
+from walking_irl.domains.humanoid.spec import PLANAR
 from walking_irl.domains.lqr import LQR
 from walking_irl.domains.mdp.gridworld import Gridworld
 from walking_irl.domains.path.walking_path import SCALES, WalkingPath
@@ -191,24 +191,24 @@ def walking_path() -> Setting:
 
 
 def humanoid() -> Setting:
-    domain, solver = Humanoid(planar=True), solver_for(True)
+    domain, solver = Humanoid("humanoid-planar"), solver_for(PLANAR)
 
     def learner(expert: Expert) -> Learner:
         x, rng = expert.demonstration.to_vector(), np.random.default_rng(0)
 
         def shaken() -> Array:
-            starts = [solver.shake(x, SHAKE, rng) for _ in range(LIBRARY)]
-            return -np.array([solver.problem.evaluate(v).folded() for v in starts])
+            starts = [solver.perturb(x, SHAKE, rng) for _ in range(LIBRARY)]
+            return -np.array([solver.problem.evaluate(v).total_costs() for v in starts])
 
         sources: dict[str, Source] = {
             "iterates": lambda answer: answer.evaluated,
-            "library": once(lambda: -np.array([g.folded for g in load_library(True).values()])),
+            "library": once(lambda: -np.array([g.total_costs for g in known_gaits(PLANAR)])),
             "demonstration": once(shaken),
         }
         return Learner(domain.learner(expert), sources)
 
     def expert(rng: np.random.Generator) -> Expert:
-        return domain.demonstrate(typical_weights(rng), rng, Protocol(0)).expert
+        return domain.demonstrate(typical_weights(rng), rng, Trials(0)).expert
 
     return Setting("humanoid-planar", expert, learner, 0.1, 3, MIN_WEIGHT)
 

@@ -19,12 +19,14 @@ from bench import medians, table, verdict
 from mujoco import minimize
 
 from walking_irl.arrays import Array
-from walking_irl.domains.humanoid.body.anatomy import load_walker
 from walking_irl.domains.humanoid.gait.library import load_library
 from walking_irl.domains.humanoid.learner import NUDGE, solver_for
+from walking_irl.domains.humanoid.optimiser.descent import FD_STEPS
 from walking_irl.domains.humanoid.optimiser.linearisation import weighted
-from walking_irl.domains.humanoid.optimiser.solver import FD_STEPS, GaitSolver, Stage, stage
+from walking_irl.domains.humanoid.optimiser.solver import GaitSolver
+from walking_irl.domains.humanoid.optimiser.stages import Stage, stage
 from walking_irl.domains.humanoid.optimiser.transcription import ROOT_PENALTY
+from walking_irl.domains.humanoid.spec import HUMANOID, PLANAR
 
 MAX_OF_DERIVATIVES, MIN_OF_DENSE = 2.0, 15.0
 
@@ -93,14 +95,15 @@ def dense_iteration(query: Query, iterations: int) -> float:
     dense = 0.0
 
     def residual(x: Array) -> Array:
-        return weighted(problem.evaluate(x.ravel()), w, ROOT_PENALTY).flat()[:, None]
+        ev = problem.evaluate(x.ravel())
+        return weighted(problem.stack, ev, w, ROOT_PENALTY).flat()[:, None]
 
     def jacobian(x: Array, r: Array) -> Array:
         nonlocal dense
-        lin = solver.linearise(x.ravel())
+        at = solver.linearise(x.ravel()).at(w, ROOT_PENALTY)
         start = time.process_time()
         unit = np.eye(x.size)
-        J = np.column_stack([lin.times(e, w, ROOT_PENALTY).flat() for e in unit])
+        J = np.column_stack([at.times(e).flat() for e in unit])
         dense += time.process_time() - start
         return J
 
@@ -118,11 +121,12 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=7)
     parser.add_argument("--quick", action="store_true", help="planar, few iterations, once")
     args = parser.parse_args()
-    planar, repeats = args.planar or args.quick, 1 if args.quick else args.repeats
-    library = load_library(planar)
-    solver = solver_for(planar)
+    spec = PLANAR if args.planar or args.quick else HUMANOID
+    repeats = 1 if args.quick else args.repeats
+    library = load_library(spec.body)
+    solver = solver_for(spec)
     start = library["reference"].gait.to_vector()
-    x = solver.shake(start, NUDGE, np.random.default_rng(0))
+    x = solver.perturb(start, NUDGE, np.random.default_rng(0))
     query = Query(solver, library[args.gait].w, x, (stage(1e6, 3 if args.quick else 30, 1e-7),))
     parts = (query.solve, query.mujoco_calls(True), query.mujoco_calls(False))
     whole, derivatives, inverse = (t / query.iterations for t in medians(parts, repeats))
@@ -133,7 +137,7 @@ def main() -> None:
     times["mujoco.minimize.least_squares, one iteration"] = dense
     rows = [[n, f"{1e3 * t:.1f}", f"{t / derivatives:.2f}"] for n, t in times.items()]
     print(
-        f"{load_walker(planar).name}: {query.iterations} iterations, {query.evaluations} "
+        f"{spec.walker.name}: {query.iterations} iterations, {query.evaluations} "
         f"evaluations, {len(x)} unknowns\n"
     )
     print(table(["part", "ms", "of derivatives"], rows) + "\n")

@@ -21,7 +21,7 @@ from bench import table, verdict
 from walking_irl.cpirl.loop import cpirl
 from walking_irl.domains.humanoid import domain as domain_module
 from walking_irl.domains.humanoid import solver as gait_solver
-from walking_irl.domains.humanoid.closed_loop.trials import Protocol, measure
+from walking_irl.domains.humanoid.closed_loop.trials import Trials, measure
 from walking_irl.domains.humanoid.domain import Humanoid, exact_expert
 from walking_irl.domains.humanoid.gait.library import load_library
 from walking_irl.domains.humanoid.optimiser.linearisation import Linearisation
@@ -99,7 +99,7 @@ def timers(clock: Clock) -> Iterator[None]:
             patch.stop()
 
 
-def make_expert(clock: Clock, domain: Humanoid, protocol: Protocol, seed: int) -> Expert:
+def make_expert(clock: Clock, domain: Humanoid, protocol: Trials, seed: int) -> Expert:
     """The expert of hidden weights, timed."""
     rng = np.random.default_rng(seed)
     with timers(clock), mock.patch.object(domain_module, "measure", clock.wrap(MEASURE, measure)):
@@ -109,12 +109,12 @@ def make_expert(clock: Clock, domain: Humanoid, protocol: Protocol, seed: int) -
 
 def shipped_expert(domain: Humanoid) -> Expert:
     """An exact expert that walks the shipped reference gait."""
-    shipped = load_library(domain.planar)["reference"]
-    return exact_expert(shipped.gait, shipped.folded)
+    shipped = load_library(domain.spec.body)["reference"]
+    return exact_expert(shipped.gait, shipped.total_costs)
 
 
 def recover(
-    clock: Clock, domain: Humanoid, expert: Expert, protocol: Protocol, seed: int, max_solves: int
+    clock: Clock, domain: Humanoid, expert: Expert, protocol: Trials, seed: int, max_solves: int
 ) -> list[Iteration]:
     """One recovery, timed."""
     remeasure = domain.remeasure(protocol, seed)
@@ -159,8 +159,8 @@ def main() -> None:
         "--quick", action="store_true", help="planar, the shipped gait as expert, two solves"
     )
     args = parser.parse_args()
-    domain = Humanoid(args.planar or args.quick)
-    protocol = Protocol(0 if args.quick else args.rollouts)
+    domain = Humanoid("humanoid-planar" if args.planar or args.quick else "humanoid")
+    protocol = Trials(0 if args.quick else args.rollouts)
     expert_clock, clock = Clock(), Clock()
     if args.quick:
         expert = shipped_expert(domain)

@@ -14,7 +14,7 @@ import numpy as np
 
 from walking_irl.cpirl.loop import cpirl
 from walking_irl.cpirl.summary import summarise
-from walking_irl.domains.humanoid.closed_loop.trials import Protocol
+from walking_irl.domains.humanoid.closed_loop.trials import Trials
 from walking_irl.domains.humanoid.domain import Humanoid
 from walking_irl.domains.humanoid.population import typical_weights
 from walking_irl.recording import Experiment, Recorder
@@ -35,11 +35,11 @@ def main() -> None:
     args = parser.parse_args()
 
     rng = np.random.default_rng(args.seed)
-    domain = Humanoid(planar=args.planar)
+    domain = Humanoid("humanoid-planar" if args.planar else "humanoid")
     with workers() as executor:
         # Somebody walks for weights that only the last line of this file may look at.
         w_hidden = typical_weights(rng)
-        protocol = Protocol(rollouts=20, noise=0.02)
+        protocol = Trials(rollouts=20, noise=0.02)
         shown = domain.demonstrate(w_hidden, rng, protocol, executor)
         expert = shown.expert
 

@@ -14,7 +14,7 @@ import numpy as np
 import rerun as rr
 
 from walking_irl.cli.gait import png
-from walking_irl.domains.humanoid.costs.objectives import REFERENCE_WEIGHTS
+from walking_irl.domains.humanoid.costs.defaults import REFERENCE_WEIGHTS
 from walking_irl.domains.humanoid.domain import Humanoid
 from walking_irl.domains.humanoid.gait.gait import Gait, whole_cycle
 from walking_irl.domains.humanoid.gait.pictures import SIDE, photograph
@@ -38,7 +38,7 @@ def main() -> None:
     parser.add_argument("--planar", action="store_true", help="a smaller body, in a plane")
     args = parser.parse_args()
 
-    domain = Humanoid(planar=args.planar)
+    domain = Humanoid("humanoid-planar" if args.planar else "humanoid")
     names = [o.name for o in domain.objectives]
     gaits: dict[str, Gait] = {}
     costs = []

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from walking_irl.domains.humanoid.closed_loop.trials import Protocol
+from walking_irl.domains.humanoid.closed_loop.trials import Trials
 from walking_irl.domains.humanoid.closed_loop.trials import measure as walk_and_measure
 from walking_irl.domains.humanoid.domain import Humanoid
 from walking_irl.domains.lqr import LQR
@@ -45,7 +45,7 @@ def measure(domain, response, rng: np.random.Generator) -> tuple[np.ndarray, np.
     if isinstance(domain, LQR):
         return _simulated_lqr(domain, response.policy), np.full(domain.n_objectives, 1e-6)
     if isinstance(domain, Humanoid):  # closed loop in forward dynamics
-        walked = walk_and_measure(domain.planar, response.policy, Protocol(2, noise=0.0), rng)
+        walked = walk_and_measure(domain.spec, response.policy, Trials(2, noise=0.0), rng)
         return -walked.mean, 1e-3 * np.abs(response.mu)
     assert isinstance(domain, WalkingPath)
     mu = -np.mean(

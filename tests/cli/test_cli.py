@@ -16,7 +16,7 @@ from walking_irl import __version__, experiments
 from walking_irl.cli import recover
 from walking_irl.cli.main import main
 from walking_irl.cli.view import SCREENS
-from walking_irl.domains.humanoid.costs.objectives import REFERENCE_WEIGHTS
+from walking_irl.domains.humanoid.costs.defaults import REFERENCE_WEIGHTS
 from walking_irl.domains.humanoid.domain import Humanoid
 from walking_irl.domains.humanoid.gait.files import load_gait, save_gait
 from walking_irl.domains.humanoid.gait.gait import whole_cycle
@@ -87,14 +87,14 @@ def one_sentence(err):
 
 @pytest.fixture(scope="module")
 def planar():
-    return Humanoid(planar=True).walker
+    return Humanoid("humanoid-planar").walker
 
 
 @pytest.fixture(scope="module")
 def demonstration(tmp_path_factory, planar):
     """A shipped planar gait as .npz; its columns by name."""
     path = tmp_path_factory.mktemp("gait") / "gait.npz"
-    save_gait(path, load_gaits(planar=True)["reference"], planar)
+    save_gait(path, load_gaits("humanoid-planar")["reference"], planar)
     with np.load(path) as data:
         return path, {name: data[name] for name in data.files}
 

@@ -16,7 +16,7 @@ import rerun_cli
 from walking_irl.arrays import Array
 from walking_irl.cpirl.loop import cpirl
 from walking_irl.cpirl.summary import summarise
-from walking_irl.domains.humanoid.body.anatomy import load_walker
+from walking_irl.domains.humanoid.body.load import load_walker
 from walking_irl.domains.humanoid.gait.gait import Gait, cycle_motion
 from walking_irl.domains.lqr import LQR
 from walking_irl.errors import InvalidInputError, RecordingError

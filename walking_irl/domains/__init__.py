@@ -16,11 +16,11 @@ class Entry(NamedTuple):
     solver: str
 
 
-def _humanoid(planar: bool) -> Callable[[], Any]:
+def _humanoid(body: str) -> Callable[[], Any]:
     def make() -> Any:
         from walking_irl.domains.humanoid.domain import Humanoid
 
-        return Humanoid(planar)
+        return Humanoid(body)
 
     return make
 
@@ -51,10 +51,14 @@ def _walking_path(**options: Any) -> Any:
 
 DOMAINS: dict[str, Entry] = {
     "humanoid": Entry(
-        _humanoid(False), "3-D walker, 25 joints", "trajectory optimisation by inverse dynamics"
+        _humanoid("humanoid"),
+        "3-D walker, 25 joints",
+        "trajectory optimisation by inverse dynamics",
     ),
     "humanoid-planar": Entry(
-        _humanoid(True), "planar walker, 14 joints", "trajectory optimisation by inverse dynamics"
+        _humanoid("humanoid-planar"),
+        "planar walker, 14 joints",
+        "trajectory optimisation by inverse dynamics",
     ),
     "gridworld": Entry(
         _gridworld, "16 x 16 cells, 9 patches", "policy iteration, exact linear solves"

@@ -13,7 +13,7 @@ import numpy as np
 from walking_irl.arrays import Array
 from walking_irl.baselines import kelley, lpal, max_margin, mwal, projection
 from walking_irl.cpirl.loop import cpirl
-from walking_irl.domains.humanoid.closed_loop.trials import Protocol
+from walking_irl.domains.humanoid.closed_loop.trials import Trials
 from walking_irl.domains.humanoid.domain import Humanoid
 from walking_irl.domains.humanoid.population import typical_weights
 from walking_irl.domains.lqr import LQR
@@ -112,8 +112,8 @@ def make_domain(name: str, options: dict[str, Any]) -> Any:
         "driving": Driving,
         "lqr": LQR,
         "walking-path": WalkingPath,
-        "humanoid": partial(Humanoid, planar=False),
-        "humanoid-planar": partial(Humanoid, planar=True),
+        "humanoid": partial(Humanoid, "humanoid"),
+        "humanoid-planar": partial(Humanoid, "humanoid-planar"),
     }
     if name not in makers:
         raise InvalidInputError(f"unknown domain {name!r}; choose from {', '.join(makers)}")
@@ -137,7 +137,7 @@ def hidden_expert(task: Task, domain: Any, rng: np.random.Generator) -> tuple[Ar
 
 def _drawn(task: Task, domain: Any, rng: np.random.Generator) -> tuple[Array, Expert]:
     if isinstance(domain, Humanoid):
-        return _walker(domain.planar, task.criterion == "dominance", task.seed)
+        return _walker(domain.spec.body, task.criterion == "dominance", task.seed)
     sample = getattr(domain, "random_weights", None)
     w_E = sample(rng) if sample else rng.dirichlet(np.ones(len(domain.objectives)))
     if task.criterion == "return" or not hasattr(domain, "suboptimal_expert"):
@@ -146,13 +146,13 @@ def _drawn(task: Task, domain: Any, rng: np.random.Generator) -> tuple[Array, Ex
 
 
 @lru_cache(maxsize=32)
-def _walker(planar: bool, is_spoilt: bool, seed: int) -> tuple[Array, Expert]:
+def _walker(body: str, is_spoilt: bool, seed: int) -> tuple[Array, Expert]:
     """Hidden weights and a walker known exactly; kept, for the search takes longer than a row."""
-    domain, rng = Humanoid(planar), np.random.default_rng([seed, 7])
+    domain, rng = Humanoid(body), np.random.default_rng([seed, 7])
     w_E = typical_weights(rng)
     if is_spoilt:
         return w_E, domain.demonstrate_poorly(w_E, rng).expert
-    return w_E, domain.demonstrate(w_E, rng, Protocol(rollouts=0)).expert
+    return w_E, domain.demonstrate(w_E, rng, Trials(rollouts=0)).expert
 
 
 def run_task(task: Task) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from walking_irl.domains.humanoid.closed_loop.trials import Protocol
+from walking_irl.domains.humanoid.closed_loop.trials import Trials
 from walking_irl.domains.humanoid.domain import Humanoid, exact_expert
 from walking_irl.domains.humanoid.gait.files import load_gait
 from walking_irl.domains.humanoid.gait.gait import Gait, cycle_motion
@@ -34,14 +34,14 @@ def humanoid_subject(domain: Humanoid, setup: Setup, executor: Executor | None) 
     if setup.population not in POPULATIONS:
         choices = ", ".join(POPULATIONS)
         raise InvalidInputError(f"unknown population {setup.population!r}; choose from {choices}")
-    w_E = POPULATIONS[setup.population](rng)
+    w_E = POPULATIONS[setup.population](rng, domain.spec.stack.reference_weights)
     if setup.weights is not None:
-        w_E = check_weights(np.asarray(setup.weights))
+        w_E = check_weights(np.asarray(setup.weights), domain.spec)
     if setup.expert == "suboptimal":
         made = domain.demonstrate_poorly(w_E, rng, executor)
         return Subject(made.expert, made.gait, w_E, made.expert.mu)
-    made = domain.demonstrate(w_E, rng, _protocol(setup), executor)
-    return Subject(made.expert, made.gait, w_E, -made.optimum.folded, made.rollouts)
+    made = domain.demonstrate(w_E, rng, _trials(setup), executor)
+    return Subject(made.expert, made.gait, w_E, -made.optimum.total_costs, made.rollouts)
 
 
 def humanoid_case(
@@ -52,10 +52,10 @@ def humanoid_case(
         domain,
         subject,
         domain.learner(subject.expert, THREADS),
-        measure=domain.remeasure(_protocol(setup), setup.seed, executor),
+        measure=domain.remeasure(_trials(setup), setup.seed, executor),
         min_weight=MIN_WEIGHT,
     )
-    case.watch = lambda f: setattr(solver_for(domain.planar, THREADS), "watch", f)
+    case.watch = lambda f: setattr(case.forward, "on_step", f)
     if setup.record is not None:
         from walking_irl.recording.views.gait import WalkerView
 
@@ -64,10 +64,10 @@ def humanoid_case(
     return case
 
 
-def _protocol(setup: Setup) -> Protocol:
+def _trials(setup: Setup) -> Trials:
     """How the expert is recorded; a demonstration and a spoilt walk are known exactly."""
     is_exact = setup.expert == "suboptimal" or setup.demonstration is not None
-    return Protocol(0 if is_exact else setup.rollouts, setup.noise, setup.disturbance)
+    return Trials(0 if is_exact else setup.rollouts, setup.noise, setup.disturbance)
 
 
 def one_cycle(domain: Humanoid, gait: Gait) -> Rollout:
@@ -84,11 +84,11 @@ def _folded(domain: Humanoid, gait: Gait, path: Path) -> np.ndarray:
     Raises:
         InvalidInputError: If it is not a walk that this body can do.
     """
-    evaluation = solver_for(domain.planar).problem.evaluate(gait.to_vector())
+    evaluation = solver_for(domain.spec).problem.evaluate(gait.to_vector())
     worst = float(np.abs(evaluation.root).max())
     if not worst < PHYSICAL:
         raise InvalidInputError(
             f"{path} is not a walk of this body: its root would need {worst:.2g} body weights of "
             f"external force (at most {PHYSICAL}); give a gait saved by walking-irl gait --save"
         )
-    return evaluation.folded()
+    return evaluation.total_costs()

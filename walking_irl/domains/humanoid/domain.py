@@ -4,19 +4,22 @@ from __future__ import annotations
 
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
 from walking_irl.arrays import Array
-from walking_irl.domains.humanoid.body.anatomy import Walker, load_walker
+from walking_irl.domains.humanoid.body.anatomy import Walker
 from walking_irl.domains.humanoid.closed_loop.policy import tracking_policy
 from walking_irl.domains.humanoid.closed_loop.rollout import averaged_gait
-from walking_irl.domains.humanoid.closed_loop.trials import MANY, Measurement, Protocol, measure
-from walking_irl.domains.humanoid.costs.objectives import OBJECTIVES
+from walking_irl.domains.humanoid.closed_loop.trials import MANY, Measurement, Trials, measure
+from walking_irl.domains.humanoid.costs.defaults import DEFAULT_COSTS, Costs
 from walking_irl.domains.humanoid.expert_search import OptimalGait, best_gait
 from walking_irl.domains.humanoid.gait.gait import Gait
-from walking_irl.domains.humanoid.learner import Imitator, search, solver_for
-from walking_irl.domains.humanoid.optimiser.solver import Solution, stage
+from walking_irl.domains.humanoid.learner import WarmStartSolver, search, solver_for
+from walking_irl.domains.humanoid.optimiser.solver import Solution
+from walking_irl.domains.humanoid.optimiser.stages import stage
+from walking_irl.domains.humanoid.spec import WalkerSpec
 from walking_irl.errors import SolverError
 from walking_irl.expert import expert_from_returns
 from walking_irl.types import Expert, Objective, Response, Rollout
@@ -54,18 +57,16 @@ class Remeasure:
     """Measures a learner's gait the way the expert's was measured, under its own disturbances."""
 
     def __init__(
-        self, planar: bool, protocol: Protocol, seed: int, executor: Executor | None
+        self, spec: WalkerSpec, trials: Trials, seed: int, executor: Executor | None
     ) -> None:
-        n = max(protocol.rollouts, MANY if protocol.disturbance == "kicks" else 0)
-        self.planar, self.executor = planar, executor
-        self.protocol = Protocol(
-            n, protocol.noise, protocol.disturbance, protocol.cycles, protocol.skip
-        )
+        n = max(trials.rollouts, MANY if trials.disturbance == "kicks" else 0)
+        self.spec, self.executor = spec, executor
+        self.trials = replace(trials, rollouts=n)
         self.rng = np.random.default_rng([seed, 1])
 
     def __call__(self, policy: Gait) -> tuple[Array, Array]:
-        """Mean feature expectations (6,) of a gait in closed loop, and their covariance (6, 6)."""
-        measured = measure(self.planar, policy, self.protocol, self.rng, self.executor)
+        """Mean feature expectations (K,) of a gait in closed loop, and their covariance (K, K)."""
+        measured = measure(self.spec, policy, self.trials, self.rng, self.executor)
         return -measured.mean, measured.covariance
 
 
@@ -73,23 +74,26 @@ class Humanoid:
     """The walking humanoid (see :mod:`walking_irl.domains.humanoid`).
 
     Args:
-        planar: Whether it walks in the sagittal plane only (14 instead of 25 joints).
+        body: "humanoid", "humanoid-planar" (14 instead of 25 joints, in the sagittal plane), or the
+            path of an MJCF file of your own (see :mod:`~.body.load`).
+        costs: What it may walk for, and what it avoids (see :mod:`~.costs.base`); drop, add or
+            rescale them as you like, for example
+            ``(*DEFAULT_COSTS, MyCost())`` or ``tuple(c for c in DEFAULT_COSTS if ...)``.
     """
 
-    objectives: tuple[Objective, ...] = OBJECTIVES
-
-    def __init__(self, planar: bool = False) -> None:
-        self.planar = planar
-        self.name = "humanoid-planar" if planar else "humanoid"
+    def __init__(self, body: str | Path = "humanoid", costs: Costs = DEFAULT_COSTS) -> None:
+        self.spec = WalkerSpec(str(body), costs)
+        self.name = Path(self.spec.body).stem
+        self.objectives: tuple[Objective, ...] = self.spec.stack.objectives
 
     @property
     def walker(self) -> Walker:
         """The body."""
-        return load_walker(self.planar)
+        return self.spec.walker
 
     def forward(self, w: Array, executor: Executor | None = None) -> Response:
-        """Best gait for weights ``w``, shape (6,), from the shipped gaits."""
-        return search(self.planar, w, executor)
+        """Best gait for weights ``w``, shape (K,), from the shipped gaits."""
+        return search(self.spec, w, executor)
 
     def expert(self, w_E: Array, rng: np.random.Generator) -> Expert:
         """Expert for hidden weights, known by 20 closed-loop trajectories."""
@@ -99,30 +103,30 @@ class Humanoid:
         self,
         w_E: Array,
         rng: np.random.Generator,
-        protocol: Protocol | None = None,
+        trials: Trials | None = None,
         executor: Executor | None = None,
     ) -> Demonstration:
         """Solve for the expert's gait and record it.
 
         Args:
-            w_E: Hidden weights, shape (6,).
+            w_E: Hidden weights, shape (K,).
             rng: Source of the search's hops and of the disturbances.
-            protocol: What is recorded.
+            trials: What is recorded.
             executor: Runs independent solves and trajectories side by side.
 
         Raises:
             FallError: If the expert falls.
         """
         search_rng, walk_rng = rng.spawn(2)
-        optimum = best_gait(self.planar, w_E, search_rng, executor)
+        optimum = best_gait(self.spec, w_E, search_rng, executor)
         gait = Gait.from_vector(optimum.x, len(self.walker.joints))
-        protocol = protocol or Protocol()
-        if protocol.rollouts == 0:
-            expert = exact_expert(gait, optimum.folded)
+        trials = trials or Trials()
+        if trials.rollouts == 0:
+            expert = exact_expert(gait, optimum.total_costs)
             return Demonstration(expert, gait, optimum, ())
-        measured = measure(self.planar, gait, protocol, walk_rng, executor)
+        measured = measure(self.spec, gait, trials, walk_rng, executor)
         policy = tracking_policy(self.walker, gait)
-        shown = averaged_gait(self.walker, measured.rollouts, policy, skip=protocol.skip)
+        shown = averaged_gait(self.walker, measured.rollouts, policy, skip=trials.skip)
         return Demonstration(expert_from(measured, shown), gait, optimum, measured.rollouts)
 
     def demonstrate_poorly(
@@ -131,7 +135,7 @@ class Humanoid:
         """A walk that no weights make optimal: the best gait, shaken, then only made physical.
 
         Args:
-            w_E: Weights of the gait that is spoilt, shape (6,).
+            w_E: Weights of the gait that is spoilt, shape (K,).
             rng: Source of the search's hops and of the shake.
             executor: Runs independent solves side by side.
 
@@ -139,26 +143,26 @@ class Humanoid:
             SolverError: If no shake spoils it by 1 to 10 %.
         """
         search_rng, shake_rng = rng.spawn(2)
-        optimum = best_gait(self.planar, w_E, search_rng, executor)
+        optimum = best_gait(self.spec, w_E, search_rng, executor)
         spoilt = self._spoilt(w_E, optimum, shake_rng)
         gait = Gait.from_vector(spoilt.x, len(self.walker.joints))
-        expert = replace(exact_expert(gait, spoilt.folded), suboptimality=0.0)
+        expert = replace(exact_expert(gait, spoilt.total_costs), suboptimality=0.0)
         return Demonstration(expert, gait, optimum, ())
 
     def _spoilt(self, w_E: Array, optimum: OptimalGait, rng: np.random.Generator) -> Solution:
-        solver, amplitude, best = solver_for(self.planar), SPOILT_BY, float(optimum.folded @ w_E)
+        solver, amplitude, best = solver_for(self.spec), SPOILT_BY, float(optimum.total_costs @ w_E)
         for _ in range(SPOILING):
-            start = solver.shake(optimum.x, amplitude, rng)
+            start = solver.perturb(optimum.x, amplitude, rng)
             spoilt = solver.solve(w_E, start, TO_PHYSICS)
-            worse = float(spoilt.folded @ w_E) / best - 1.0
+            worse = float(spoilt.total_costs @ w_E) / best - 1.0
             if WORSE[0] <= worse <= WORSE[1]:
                 return spoilt
             amplitude *= 0.7 if worse > WORSE[1] else 1.3
         raise SolverError(f"no shake of {SPOILING} made the gait worse by 1 to 10 %")
 
-    def learner(self, expert: Expert, threads: int = 1) -> Imitator:
+    def learner(self, expert: Expert, threads: int = 1) -> WarmStartSolver:
         """The learner's forward solver: it starts from the demonstrated gait."""
-        return Imitator(expert.demonstration, self.planar, threads)
+        return WarmStartSolver(expert.demonstration, self.spec, threads)
 
     def pack(self, policy: Gait) -> Array:
         """A gait as one array, for files."""
@@ -169,21 +173,21 @@ class Humanoid:
         return Gait.from_vector(packed, len(self.walker.joints))
 
     def remeasure(
-        self, protocol: Protocol, seed: int = 0, executor: Executor | None = None
+        self, trials: Trials, seed: int = 0, executor: Executor | None = None
     ) -> Remeasure | None:
         """Measures learners' gaits as the expert's was; None where the expert is exact."""
-        if protocol.rollouts == 0:
+        if trials.rollouts == 0:
             return None
-        return Remeasure(self.planar, protocol, seed, executor)
+        return Remeasure(self.spec, trials, seed, executor)
 
 
-def exact_expert(gait: Gait, folded: Array) -> Expert:
+def exact_expert(gait: Gait, total_costs: Array) -> Expert:
     """Expert whose gait is known exactly on its knots."""
-    slack = SUBOPTIMALITY * float(np.mean(folded))
-    return Expert(-folded, np.zeros(len(folded)), slack, demonstration=gait)
+    slack = SUBOPTIMALITY * float(np.mean(total_costs))
+    return Expert(-total_costs, np.zeros(len(total_costs)), slack, demonstration=gait)
 
 
 def expert_from(measured: Measurement, shown: Gait) -> Expert:
     """Expert known by recorded walks: their mean with its error bars, and their mean gait."""
     slack = SUBOPTIMALITY * float(np.mean(measured.mean))
-    return expert_from_returns(-measured.folded, suboptimality=slack, demonstration=shown)
+    return expert_from_returns(-measured.total_costs, suboptimality=slack, demonstration=shown)

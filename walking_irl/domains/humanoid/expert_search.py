@@ -1,8 +1,10 @@
-"""The expert: the best gait for hidden weights, and what is recorded of it.
+"""The expert: the best gait for ground-truth weights, by a search over basins.
 
-The search for the gait is at least as hard as any learner's query: it starts from several gaits,
-shakes the best, takes two basins to the full root penalty, and finishes far below the learner's
-tolerance, also from the nudged starts that the learner uses.
+The search is at least as hard as any learner's query. At a soft root penalty it starts from the
+reference gait (twice, see CONTINUE and DIRECTLY) and from the two known gaits that are cheapest,
+and makes two basin hops from the best (D. J. Wales, J. P. K. Doye 1997, Global optimization by
+basin-hopping). It takes the two best basins to the full penalty (RAISE), and the better one far
+below the learner's tolerance (FINISH), also from the perturbed start that the learner uses.
 """
 
 from __future__ import annotations
@@ -14,39 +16,59 @@ from dataclasses import dataclass
 import numpy as np
 
 from walking_irl.arrays import Array
-from walking_irl.domains.humanoid.gait.library import load_library
-from walking_irl.domains.humanoid.learner import NUDGE, check_weights, polish, run_tasks, solver_for
-from walking_irl.domains.humanoid.optimiser.solver import Solution, Stage, stage
+from walking_irl.domains.humanoid.learner import (
+    NUDGE,
+    check_weights,
+    known_gaits,
+    polish,
+    run_tasks,
+    solver_for,
+)
+from walking_irl.domains.humanoid.optimiser.solver import Solution
+from walking_irl.domains.humanoid.optimiser.stages import Stage, stage
+from walking_irl.domains.humanoid.spec import WalkerSpec
 
 SEARCH_PENALTY = 1e4
+"""Root penalty at which basins are compared: soft, so that a gait can still change its kind."""
 CONTINUE = (stage(1e3, 60, 1e-5), stage(SEARCH_PENALTY, 100, 1e-6))
+"""From a gait of other weights: first through a softer penalty, which may leave its basin."""
 DIRECTLY = (stage(SEARCH_PENALTY, 100, 1e-6),)
+"""From a gait that is to keep its basin."""
 RAISE = (stage(1e5, 60, 1e-5), stage(1e6, 150, 1e-6))
-FINISH = (stage(1e6, 100, 1e-8), stage(1e6, 120, 1e-11))
+"""From the search's penalty to the full one."""
 APPROACH = (stage(SEARCH_PENALTY, 60, 1e-6), *RAISE)
+"""From a perturbed gait to the full penalty."""
+FINISH = (stage(1e6, 100, 1e-8), stage(1e6, 120, 1e-11))
+"""At the full penalty far below the learner's tolerance of 1e-7."""
 HOP = np.deg2rad(1.0)
-FINISH_SHAKES = ((0.0, NUDGE), *np.deg2rad([[0.1, 0.3], [0.3, 1.0], [0.1, 0.3]]).tolist())
-"""Amplitudes of the starts of the last solves, by round [rad]; the first is the learner's."""
-SAME_BASIN, RIVAL_BASIN = 2e-5, 5e-3
-"""Relative cost differences below which gaits are the same, and above which a basin is lost."""
+"""Amplitude of a basin hop: a perturbation of the best gait, which is then solved again [rad]."""
+FINISH_STARTS = ((0.0, NUDGE), *np.deg2rad([[0.1, 0.3], [0.3, 1.0], [0.1, 0.3]]).tolist())
+"""Perturbations from which the best gait is solved again, two a round [rad].
+
+The first round has the learner's own start (NUDGE) beside the gait itself; later rounds, from ever
+farther away, are run only while no gait found is a smooth minimum."""
+SAME_BASIN = 2e-5
+"""Relative difference of costs below which two gaits are the same one."""
+OTHER_BASIN = 5e-3
+"""Relative difference of costs above which another basin is no longer followed."""
 SMOOTH = 1e-8
 """Decrement of a demonstration on which every derivative can be trusted."""
 
 
 @dataclass(frozen=True)
 class OptimalGait:
-    """A gait, its folded costs and how it was found.
+    """A gait, its total costs and how it was found.
 
     Attributes:
         x: Gait vector.
-        folded: Folded costs G, shape (6,).
+        total_costs: Its total costs G, shape (K,).
         decrement: Undamped Newton decrement; above 1e-5 the optimum sits on a contact jump.
         starts: Solves of the whole search.
         iterations: Their iterations.
     """
 
     x: Array
-    folded: Array
+    total_costs: Array
     decrement: float
     starts: int
     iterations: int
@@ -55,13 +77,13 @@ class OptimalGait:
 class _Search:
     """Counts solves and keeps what they found."""
 
-    def __init__(self, planar: bool, w: Array, executor: Executor | None) -> None:
-        self.planar, self.w, self.executor = planar, w, executor
-        self.solver = solver_for(planar)
+    def __init__(self, spec: WalkerSpec, w: Array, executor: Executor | None) -> None:
+        self.spec, self.w, self.executor = spec, w, executor
+        self.solver = solver_for(spec)
         self.starts = self.iterations = 0
 
     def run(self, jobs: Sequence[tuple[Array, tuple[Stage, ...]]]) -> list[Solution]:
-        tasks = [(self.planar, self.w, x, stages) for x, stages in jobs]
+        tasks = [(self.spec, self.w, x, stages) for x, stages in jobs]
         found: list[Solution] = run_tasks(polish, tasks, self.executor)
         self.starts += len(found)
         self.iterations += sum(s.iterations for s in found)
@@ -71,14 +93,14 @@ class _Search:
         return self.solver.problem.evaluate(s.x).total(self.w, DIRECTLY[0].penalty)
 
     def cost(self, s: Solution) -> float:
-        return float(s.folded @ self.w)
+        return float(s.total_costs @ self.w)
 
     def decrement(self, s: Solution) -> float:
         return self.solver.decrement(self.w, self.solver.linearise(s.x))
 
 
 def best_gait(
-    planar: bool,
+    spec: WalkerSpec,
     w: Array,
     rng: np.random.Generator,
     executor: Executor | None = None,
@@ -87,26 +109,28 @@ def best_gait(
     """Search hard for the best gait under weights ``w``.
 
     Args:
-        planar: Which body.
-        w: Weights, shape (6,).
-        rng: Source of the hops.
+        spec: Which body, and its costs.
+        w: Weights, shape (K,).
+        rng: Source of the basin hops.
         executor: Runs independent solves side by side.
         also: Further gait vectors to start from.
     """
-    w = check_weights(w)
-    job = _Search(planar, w, executor)
-    shipped = list(load_library(planar).values())
-    near = sorted(shipped, key=lambda s: float(s.folded @ w))[:2]
-    reference = shipped[0].gait.to_vector()
+    w = check_weights(w, spec)
+    job = _Search(spec, w, executor)
+    known = known_gaits(spec)
+    near = sorted(known, key=lambda s: float(s.total_costs @ w))[:2]
+    reference = known[0].x
     starts = [(reference, CONTINUE), (reference, DIRECTLY)]
-    starts += [(s.gait.to_vector(), CONTINUE) for s in near]
+    starts += [(s.x, CONTINUE) for s in near]
     starts += [(x, DIRECTLY) for x in also]
     found = sorted(job.run(starts), key=job.search_cost)
-    hops = [(job.solver.shake(found[0].x, HOP, r), DIRECTLY) for r in rng.spawn(2)]
+    hops = [(job.solver.perturb(found[0].x, HOP, r), DIRECTLY) for r in rng.spawn(2)]
     found = sorted(found + job.run(hops), key=job.search_cost)
     raised = job.run([(s.x, RAISE) for s in _basins(found, job)])
     chosen = _finish(job, min(raised, key=job.cost), rng)
-    return OptimalGait(chosen.x, chosen.folded, job.decrement(chosen), job.starts, job.iterations)
+    return OptimalGait(
+        chosen.x, chosen.total_costs, job.decrement(chosen), job.starts, job.iterations
+    )
 
 
 def _finish(job: _Search, best: Solution, rng: np.random.Generator) -> Solution:
@@ -115,10 +139,10 @@ def _finish(job: _Search, best: Solution, rng: np.random.Generator) -> Solution:
     A smooth gait is preferred to a cheaper one on a contact jump if it costs the same otherwise.
     """
     found = [best]
-    for amplitudes in FINISH_SHAKES:
+    for amplitudes in FINISH_STARTS:
         best = min(found, key=job.cost)
         starts = [
-            job.solver.shake(best.x, a, r) for a, r in zip(amplitudes, rng.spawn(2), strict=True)
+            job.solver.perturb(best.x, a, r) for a, r in zip(amplitudes, rng.spawn(2), strict=True)
         ]
         found += job.run(
             [
@@ -137,5 +161,5 @@ def _finish(job: _Search, best: Solution, rng: np.random.Generator) -> Solution:
 def _basins(found: Sequence[Solution], job: _Search) -> list[Solution]:
     """The best solution and the best of another basin that is nearly as good."""
     best = job.search_cost(found[0])
-    rivals = [s for s in found[1:] if 1 + SAME_BASIN < job.search_cost(s) / best < 1 + RIVAL_BASIN]
-    return [found[0], *rivals[:1]]
+    others = [s for s in found[1:] if 1 + SAME_BASIN < job.search_cost(s) / best < 1 + OTHER_BASIN]
+    return [found[0], *others[:1]]

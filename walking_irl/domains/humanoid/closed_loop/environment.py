@@ -19,15 +19,10 @@ from dm_env import specs
 from walking_irl.arrays import Array, Indices
 from walking_irl.domains.humanoid.body.anatomy import Walker
 from walking_irl.domains.humanoid.body.physics import WalkerPhysics
-from walking_irl.domains.humanoid.costs.objectives import (
-    OBJECTIVES,
-    REFERENCE_SPEED,
-    Motion,
-    costs,
-    fixed_cost,
-    layout,
-    residuals,
-)
+from walking_irl.domains.humanoid.costs.base import REFERENCE_SPEED, Channels
+from walking_irl.domains.humanoid.costs.defaults import DEFAULT_COSTS, Costs
+from walking_irl.domains.humanoid.costs.stack import cost_stack
+from walking_irl.domains.humanoid.costs.time import Time
 from walking_irl.domains.humanoid.gait.gait import Gait, cycle_motion
 from walking_irl.errors import InvalidInputError
 
@@ -82,28 +77,7 @@ class Disturbance:
     push: Push | None = None
 
 
-class _Simulation(WalkerPhysics):
-    """The same simulation, whose steps check for trouble in a fifth of the time."""
-
-    def step(self, nstep: int = 1) -> None:
-        """Advance by ``nstep`` steps; raises PhysicsError where the state is no longer valid."""
-        if not self.legacy_step:
-            super().step(nstep)
-            return
-        model, data = self.model.ptr, self.data.ptr
-        warnings, before = self._warnings, self._warnings.tolist()
-        mujoco.mj_step2(model, data)
-        if nstep > 1:
-            mujoco.mj_step(model, data, nstep - 1)
-        mujoco.mj_step1(model, data)
-        after = warnings.tolist()
-        if after != before:  # let dm_control say what it is
-            warnings[:] = before
-            with self.check_invalid_state():
-                warnings[:] = after
-
-
-class Walk(control.Task):  # type: ignore[misc]
+class WalkTask(control.Task):  # type: ignore[misc]
     """Walk along a gait's phase without falling, for the reward w.phi.
 
     Attributes:
@@ -122,27 +96,28 @@ class Walk(control.Task):  # type: ignore[misc]
         weights: Array | None = None,
         steps_per_control: int = 1,
         disturbance: Disturbance | None = None,
+        costs: Costs = DEFAULT_COSTS,
     ) -> None:
         """Set up the task; ``weights`` (K,) default to none, which saves the reward's work."""
-        if weights is not None and np.shape(weights) != (len(OBJECTIVES),):
-            raise InvalidInputError(
-                f"weights must have shape ({len(OBJECTIVES)},), got {np.shape(weights)}"
-            )
+        self.stack = cost_stack(walker, costs)
+        k = len(self.stack.objectives)
+        if weights is not None and np.shape(weights) != (k,):
+            raise InvalidInputError(f"weights must have shape ({k},), got {np.shape(weights)}")
         self.walker, self.start, self.random = walker, start, random
         self.weights = weights
         self.disturbance = disturbance or Disturbance()
         self.control_timestep = start.timestep * steps_per_control
         self.steps_per_cycle = round(start.period / self.control_timestep)
-        self.phi = np.zeros(len(OBJECTIVES))
+        self.phi = np.zeros(k)
         self.last: Step | None = None
         self.n_steps = 0
         self._steps_per_control = steps_per_control
-        self._layout = layout(walker)
         stage = np.repeat(walker.model.sensor_needstage, walker.model.sensor_dim)
         self._late = _runs(np.flatnonzero(stage == mujoco.mjtStage.mjSTAGE_ACC))
         self._unit = np.ones(walker.model.nsensordata)  # of the sensors as they are observed
-        self._unit[self._layout.touch] = walker.weight
-        (self._touch,) = _runs(self._layout.touch)
+        touch = np.array([walker.sensor[f"touch_{side}"].start for side in "rl"])
+        self._unit[touch] = walker.weight
+        (self._touch,) = _runs(touch)
         angle = 2 * math.pi / self.steps_per_cycle * np.arange(self.steps_per_cycle)
         self._phases = np.column_stack([np.cos(angle), np.sin(angle)])
         self._height = walker.joints.index("root_z")
@@ -158,7 +133,7 @@ class Walk(control.Task):  # type: ignore[misc]
         if self.disturbance.velocity_noise > 0:
             self._kick(data, self.disturbance.velocity_noise)
         self.n_steps, self.last, self._pushing = 0, None, False
-        self.phi = np.zeros(len(OBJECTIVES))
+        self.phi = np.zeros_like(self.phi)
         self._kick_at = self.random.randint(self.steps_per_cycle)
 
     def before_step(self, action: Array, physics: WalkerPhysics) -> None:
@@ -231,22 +206,24 @@ class Walk(control.Task):  # type: ignore[misc]
         return specs.BoundedArray((len(joints),), float, lower, upper, name="\t".join(joints))
 
     def _features(self, step: Step, after: Step) -> Array:
-        motion = Motion(
+        channels = Channels(
             q=step.q[None],
             v=step.v[None],
             v_next=after.v[None],
             a=step.a[None],
             tau=step.u[None],
+            tau_next=after.u[None],
             s=step.sensors[None],
             s_next=after.sensors[None],
             h=self.control_timestep,
             distance=self.start.speed * self.control_timestep,
         )
-        r = residuals(self.walker, self._layout, motion)
-        cost = costs(r, motion.pace) + fixed_cost(r)
+        cost = self.stack.total_costs(channels)
         # Seconds per metre, linearised at the gait's speed: the reward must feel a faster step.
-        slow = 1 - (after.q[0] - step.q[0]) / motion.distance
-        cost[_TIME] += slow * REFERENCE_SPEED / self.start.speed / OBJECTIVES[_TIME].scale
+        slow = 1 - (after.q[0] - step.q[0]) / channels.distance
+        for k, c in enumerate(self.stack.per_metre):
+            if isinstance(c, Time):
+                cost[k] += slow * REFERENCE_SPEED / self.start.speed / c.scale
         return -cost
 
     def _push(self, data: mujoco.MjData, push: Push) -> None:
@@ -258,9 +235,6 @@ class Walk(control.Task):  # type: ignore[misc]
     def _kick(self, data: mujoco.MjData, deviation: float) -> None:
         n = self.walker.n_root
         data.qvel[n:] += deviation * self.random.normal(size=len(self.walker.joints) - n)
-
-
-_TIME = [o.name for o in OBJECTIVES].index("time")
 
 
 def _runs(indices: Indices) -> list[slice]:
@@ -286,6 +260,7 @@ def environment(
     steps_per_control: int = 1,
     time_limit: float = float("inf"),
     disturbance: Disturbance | None = None,
+    costs: Costs = DEFAULT_COSTS,
 ) -> control.Environment:
     """A dm_control environment in which the walker walks.
 
@@ -297,16 +272,18 @@ def environment(
         steps_per_control: Simulation steps for which an action is held.
         time_limit: End of an episode [s].
         disturbance: Noise, kicks and pushes.
+        costs: What the reward is made of.
     """
     if steps_per_control < 1:
         raise InvalidInputError(f"steps_per_control must be 1 or more, got {steps_per_control}")
-    task = Walk(
+    task = WalkTask(
         walker,
         start,
         random=np.random.RandomState(rng.bit_generator),
         weights=weights,
         steps_per_control=steps_per_control,
         disturbance=disturbance,
+        costs=costs,
     )
-    physics = _Simulation.of(walker, start.timestep)
+    physics = WalkerPhysics.of(walker, start.timestep)
     return control.Environment(physics, task, time_limit=time_limit, n_sub_steps=steps_per_control)

@@ -13,10 +13,10 @@ from pathlib import Path
 from zipfile import BadZipFile
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from walking_irl.arrays import Array
 from walking_irl.domains.humanoid.body.anatomy import Walker
+from walking_irl.domains.humanoid.gait.cycles import drifting_spline, mirror_average
 from walking_irl.domains.humanoid.gait.gait import Gait, whole_cycle
 from walking_irl.errors import InvalidInputError
 from walking_irl.files import write_file
@@ -93,25 +93,17 @@ def _symmetric(q: Array, period: float, walker: Walker) -> Gait:
     length = float(np.mean(q[n:, 0] - q[:n, 0]))
     if n != N_KNOTS:
         q = _resample(q, 2 * N_KNOTS, 2 * length)
-    other = q[N_KNOTS:].copy()
-    other[:, 0] -= length
-    half = (q[:N_KNOTS] + other @ walker.mirror.T) / 2
-    half[:, 0] -= half[0, 0]
-    return Gait(half, length, period / 2)
+    return mirror_average(walker, q, length, period / 2)
 
 
 def _resample(q: Array, n: int, stride: float | None = None) -> Array:
     """Periodic cubic splines through the samples, at ``n`` equal steps."""
     m = len(q)
-    stride = (
-        stride if stride is not None else 2 * float(np.mean(q[m // 2 :, 0] - q[: m - m // 2, 0]))
-    )
+    if stride is None:
+        stride = 2 * float(np.mean(q[m // 2 :, 0] - q[: m - m // 2, 0]))
     drift = np.zeros(q.shape[1])
     drift[0] = stride
-    phase = np.arange(m + 1) / m
-    steady = np.vstack([q - np.outer(phase[:-1], drift), q[:1]])
-    at = np.arange(n) / n
-    return np.asarray(CubicSpline(phase, steady, bc_type="periodic")(at) + np.outer(at, drift))
+    return drifting_spline(q, 1.0, drift)(np.arange(n) / n)[0]
 
 
 UNREADABLE = (

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import mujoco
 import numpy as np
 
 from walking_irl.arrays import Array
 from walking_irl.domains.humanoid.body.anatomy import Walker
+from walking_irl.domains.humanoid.body.physics import inverse_dynamics
 from walking_irl.domains.humanoid.gait.gait import Gait, cycle_motion
 from walking_irl.domains.humanoid.gait.norms import GROUPS
 from walking_irl.errors import InvalidInputError
@@ -75,13 +75,7 @@ def gait_cycle(walker: Walker, gait: Gait) -> Cycle:
         InvalidInputError: If the right foot never touches down: then there is no cycle to speak of.
     """
     q, v, a = cycle_motion(gait, walker.mirror)
-    force = np.empty_like(q)
-    sensors = np.empty((len(q), walker.model.nsensordata))
-    data = mujoco.MjData(walker.model)
-    for k in range(len(q)):
-        data.qpos[:], data.qvel[:], data.qacc[:] = q[k], v[k], a[k]
-        mujoco.mj_inverse(walker.model, data)
-        force[k], sensors[k] = data.qfrc_inverse, data.sensordata
+    force, sensors = inverse_dynamics(walker, q, v, a)
     touch = np.hstack([sensors[:, walker.sensor[f"touch_{s}"]] for s in "rl"]) / walker.weight
     k0 = _touch_down(touch[:, 0])
     q[:k0, 0] += 2 * gait.step_length
@@ -184,7 +178,7 @@ def _vertical_force(c: Cycle) -> dict[str, float]:
 def _centre_of_mass(c: Cycle) -> dict[str, float]:
     com = c.sensor("com")
     out: dict[str, float] = {"com_vertical": np.ptp(com[:, 2])}
-    if c.walker.n_root == 6:
+    if c.walker.is_lateral:
         right, left = (
             c.sensor(f"ankle_{s}")[c.force[:, i] > LOADED, 1] for i, s in enumerate("rl")
         )
@@ -228,7 +222,7 @@ def _upper_body(c: Cycle) -> dict[str, float]:
         "arm_antiphase": np.corrcoef(shoulder, c.degrees("hip_flexion_l"))[0, 1],
         "trunk_pitch": np.ptp(trunk[:, 0]),
     }
-    if c.walker.n_root == 6:
+    if c.walker.is_lateral:
         out["trunk_roll"] = np.ptp(trunk[:, 1])
         out["pelvis_yaw"] = np.ptp(c.degrees("root_yaw"))
         out["pelvis_list"] = np.ptp(c.degrees("root_roll"))

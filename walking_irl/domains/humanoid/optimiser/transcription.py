@@ -21,23 +21,15 @@ import numpy as np
 
 from walking_irl.arrays import Array
 from walking_irl.domains.humanoid.body.anatomy import Walker
-from walking_irl.domains.humanoid.costs.objectives import (
-    UNIT,
-    Layout,
-    Motion,
-    Residuals,
-    costs,
-    fixed_cost,
-    layout,
-    mean_square,
-    residuals,
-)
+from walking_irl.domains.humanoid.costs.base import Channels
+from walking_irl.domains.humanoid.costs.defaults import DEFAULT_COSTS, UNIT, Costs
+from walking_irl.domains.humanoid.costs.stack import cost_stack
 from walking_irl.domains.humanoid.gait.gait import Gait
 
 ROOT_PENALTY = 1e6 / UNIT
 """rho; leaves root forces of about 1e-5 body weights, so that the gait can be simulated."""
-GAUGE_WEIGHT = 100.0 / UNIT  # of: starts at x = 0, feet side by side at mid-step [1/m^2]
-PERIOD_WEIGHT = 900.0 / UNIT  # of the squared excess of the half period [1/s^2]
+ANCHOR_WEIGHTS = np.array([100.0, 100.0, 900.0]) / UNIT
+"""Of squared anchors: start at x = 0, feet side by side at mid-step [1/m^2], period [1/s^2]."""
 PERIOD_RANGE = (0.35, 1.0)  # of the half period [s]
 
 
@@ -45,20 +37,21 @@ class Evaluation(NamedTuple):
     """A gait with everything that its costs need."""
 
     x: Array
-    motion: Motion
-    residuals: Residuals
+    motion: Channels
+    residuals: Array
+    """Of all costs, shape (N, M); their columns are those of the cost stack."""
     root: Array
     """Root forces over body weight, moments over half a body weight times a metre, (N, n_root)."""
-    gauge: Array
+    anchors: Array
     """Start position [m], feet at mid-step [m], excess half period [s]; shape (3,)."""
     objective_costs: Array
-    """Scaled costs F_j / scale_j, shape (6,)."""
+    """Scaled costs F_j / scale_j, shape (K,)."""
     shared: float
     """Fixed part without the root penalty."""
     root_square: float
 
-    def folded(self) -> Array:
-        """Folded costs G at full root penalty, shape (6,)."""
+    def total_costs(self) -> Array:
+        """Total costs G at full root penalty, shape (K,)."""
         return self.objective_costs + self.shared + ROOT_PENALTY * self.root_square
 
     def total(self, w: Array, penalty: float) -> float:
@@ -85,23 +78,28 @@ class Transcription:
 
     Args:
         walker: Who walks.
+        costs: What for.
         n_knots: Knots N of half a cycle.
         threads: Threads over which the knots are divided; each has an ``MjData`` of its own.
     """
 
-    def __init__(self, walker: Walker, n_knots: int = 40, threads: int = 1) -> None:
+    def __init__(
+        self,
+        walker: Walker,
+        costs: Costs = DEFAULT_COSTS,
+        *,
+        n_knots: int = 40,
+        threads: int = 1,
+    ) -> None:
         self.walker = walker
+        self.stack = cost_stack(walker, costs)
         self.n_knots = n_knots
         self.threads = threads
-        self.at: Layout = layout(walker)
         self.nv = len(walker.joints)
         self.size = n_knots * self.nv + 2
-        weight = walker.weight
-        self.root_unit = (
-            np.array([weight, weight, 0.5 * weight])
-            if walker.n_root == 3
-            else np.repeat([weight, 0.5 * weight], 3)
-        )
+        is_slide = walker.model.jnt_type[: walker.n_root] == mujoco.mjtJoint.mjJNT_SLIDE
+        self.root_unit = walker.weight * np.where(is_slide, 1.0, 0.5)
+        self.motors = np.arange(walker.n_root, self.nv)
         self.feet = np.array([walker.sensor[f"ankle_{s}"].start for s in "lr"])
         self._pool: ThreadPoolExecutor | None = None
         self._data: list[Any] = []
@@ -175,25 +173,26 @@ class Transcription:
     ) -> Evaluation:
         walker = self.walker
         last = walker.sensor_mirror @ sensor[0] + walker.sensor_advance * gait.step_length
-        motion = Motion(
+        tau = force[:, walker.n_root :]
+        motion = Channels(
             q=q,
             v=v[:-1],
             v_next=v[1:],
             a=a,
-            tau=force[:, walker.n_root :],
+            tau=tau,
+            tau_next=np.vstack([tau[1:], walker.torque_mirror @ tau[0]]),
             s=sensor,
             s_next=np.vstack([sensor[1:], last]),
             h=gait.timestep,
             distance=gait.step_length,
         )
-        r = residuals(walker, self.at, motion)
+        r = self.stack.residuals(motion)
         root = force[:, : walker.n_root] / self.root_unit
         left, right = sensor[self.n_knots // 2, self.feet]
         low, high = PERIOD_RANGE
         period = gait.half_period
-        gauge = np.array([q[0, 0], left - right, min(0, period - low) + max(0, period - high)])
-        weights = [GAUGE_WEIGHT, GAUGE_WEIGHT, PERIOD_WEIGHT]
-        shared = fixed_cost(r) + float(weights @ gauge**2)
-        return Evaluation(
-            x, motion, r, root, gauge, costs(r, motion.pace), shared, mean_square(root)
-        )
+        anchors = np.array([q[0, 0], left - right, min(0, period - low) + max(0, period - high)])
+        costs, shared = self.stack.costs_of(r, motion.pace)
+        shared += float(ANCHOR_WEIGHTS @ anchors**2)
+        root_square = float(np.sum(root * root) / self.n_knots)
+        return Evaluation(x, motion, r, root, anchors, costs, shared, root_square)
