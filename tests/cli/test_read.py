@@ -10,7 +10,7 @@ import pytest
 from recordings import force_plates, npz, recording, sheet, storage
 
 from walking_irl.cli.main import main
-from walking_irl.domains.humanoid.body.anatomy import load_walker
+from walking_irl.domains.humanoid.body.load import load_walker
 from walking_irl.domains.humanoid.gait.files import load_gait
 from walking_irl.domains.humanoid.gait.library import load_gaits
 from walking_irl.domains.humanoid.gait.realism import gait_cycle

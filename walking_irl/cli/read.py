@@ -44,7 +44,7 @@ def add_parser(commands: Any) -> argparse.ArgumentParser:
 
 def run(args: argparse.Namespace, console: Console) -> int:
     """``walking-irl read``."""
-    from walking_irl.domains.humanoid.body.anatomy import load_walker
+    from walking_irl.domains.humanoid.body.load import load_walker
     from walking_irl.domains.humanoid.gait.files import save_gait
     from walking_irl.domains.humanoid.recorded.person import Options
     from walking_irl.domains.humanoid.recorded.reader import read_person

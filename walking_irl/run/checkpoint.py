@@ -19,7 +19,7 @@ import numpy as np
 
 from walking_irl.arrays import Array
 from walking_irl.domains import load
-from walking_irl.domains.humanoid.gait.files import UNREADABLE
+from walking_irl.domains.humanoid.recorded.archives import UNREADABLE
 from walking_irl.errors import InvalidInputError
 from walking_irl.files import write_file
 from walking_irl.run.case import Setup, Subject

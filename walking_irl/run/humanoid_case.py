@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from concurrent.futures import Executor
-from pathlib import Path
 
 import numpy as np
 
 from walking_irl.domains.humanoid.closed_loop.trials import Trials
-from walking_irl.domains.humanoid.domain import Humanoid, exact_expert
-from walking_irl.domains.humanoid.gait.files import load_gait
+from walking_irl.domains.humanoid.demonstrations import demonstrated
+from walking_irl.domains.humanoid.domain import Humanoid
 from walking_irl.domains.humanoid.gait.gait import Gait, cycle_motion
-from walking_irl.domains.humanoid.learner import check_weights, solver_for
+from walking_irl.domains.humanoid.learner import check_weights
 from walking_irl.domains.humanoid.population import POPULATIONS
 from walking_irl.errors import InvalidInputError
 from walking_irl.run.case import Case, Setup, Subject
@@ -21,15 +20,13 @@ THREADS = 2
 """Threads of one learner's solve: solves follow one another, so the cores would idle."""
 MIN_WEIGHT = 0.005
 """The learner's lower bound of every weight; the gait of a vanishing weight is ill-defined."""
-PHYSICAL = 0.05
-"""Largest root force of a demonstration [body weights]: more is not this body's walk."""
 
 
 def humanoid_subject(domain: Humanoid, setup: Setup, executor: Executor | None) -> Subject:
     """The expert that a setup asks for."""
     if setup.demonstration is not None:
-        gait = load_gait(setup.demonstration, domain.walker)
-        return Subject(exact_expert(gait, _folded(domain, gait, setup.demonstration)), gait)
+        shown = demonstrated(setup.demonstration, domain.spec)
+        return Subject(shown.expert, shown.gait, trajectories=shown.rollouts)
     rng = np.random.default_rng(setup.seed)
     if setup.population not in POPULATIONS:
         choices = ", ".join(POPULATIONS)
@@ -76,19 +73,3 @@ def one_cycle(domain: Humanoid, gait: Gait) -> Rollout:
 
     q, v, a = cycle_motion(gait, domain.walker.mirror)
     return periodic_rollout(q, v, a, gait.timestep, 2 * gait.step_length)
-
-
-def _folded(domain: Humanoid, gait: Gait, path: Path) -> np.ndarray:
-    """Folded costs of a demonstrated gait.
-
-    Raises:
-        InvalidInputError: If it is not a walk that this body can do.
-    """
-    evaluation = solver_for(domain.spec).problem.evaluate(gait.to_vector())
-    worst = float(np.abs(evaluation.root).max())
-    if not worst < PHYSICAL:
-        raise InvalidInputError(
-            f"{path} is not a walk of this body: its root would need {worst:.2g} body weights of "
-            f"external force (at most {PHYSICAL}); give a gait saved by walking-irl gait --save"
-        )
-    return evaluation.total_costs()
