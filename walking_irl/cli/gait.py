@@ -103,4 +103,12 @@ def _show_gait(content: dict[str, Any], console: Console) -> None:
         table.add_row(name.replace("_", " "), f"{content[name]:.4g} {unit}")
     for name, value in zip(content["objectives"], content["mu"], strict=True):
         table.add_row(f"mu {name}", f"{value:.5f}")
+    for group, value in content["groups"].items():
+        table.add_row(f"realism: {group.replace('_', ' ')}", f"{value:.3f}")
+    met = content["bands"]
+    table.add_row("bands met", f"{sum(met.values())} of {len(met)}")
+    for name, norm in content["norms"].items():
+        table.add_row(f"within 1 s.d. of {name}", f"{100 * norm['mean']:.0f} % of the cycle")
+        for curve, share in norm["curves"].items():
+            table.add_row(f"  {curve.replace('_', ' ')}", f"{100 * share:.0f} %")
     console.print(table)
