@@ -175,12 +175,15 @@ def test_gait_writes_every_kind_of_file_and_reads_its_own(call, tmp_path, planar
     weights = ",".join(map(str, REFERENCE_WEIGHTS))
     argv = ("gait", *PLANAR, "--weights", weights, "--seconds", 2)
     code, out, err = call(
-        *argv, "--save", "g.npz", "--png", "g.png", "--json", "g.json", "--record", "g.rrd"
-    )
-    assert code == 0 and not err and "step length" in out
+        *argv, "--save", "g.npz", "--png", "g.png", "--json", "g.json", "--record", "g.rrd",
+        "--plot", "g.svg",
+    )  # fmt: skip
+    assert code == 0 and not err and "step length" in out and "within 1 s.d." in out
     content = json.loads((tmp_path / "g.json").read_text())
     assert content.keys() >= GAIT_KEYS and content["max_root_residual"] < 5e-4
     assert (tmp_path / "g.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "g.svg").read_bytes().startswith(b"<svg")
+    assert content["norms"]["adults"]["curves"].keys() >= {"knee_flexion", "hip_extension_moment"}
     assert inspect_recording(tmp_path / "g.rrd")["frames"] > 0
     assert call(*argv, "--save", "g.csv", "--quiet") == (0, "", "")
     with (tmp_path / "g.csv").open(newline="") as file:

@@ -4,6 +4,7 @@ import io
 import json
 import os
 import zipfile
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -62,6 +63,20 @@ def test_it_says_what_was_understood_and_writes_the_cycle(call, tmp_path):
     assert call("w.mot", "--quiet") == (0, "", "")
 
 
+def test_the_picture_is_svg_with_a_panel_for_every_curve(call, tmp_path):
+    (tmp_path / "w.mot").write_text(storage(recording(GAIT, WALKER)))
+    assert call("w.mot", "--plot", "w.svg", "--quiet")[0] == 0
+    picture = ElementTree.parse(tmp_path / "w.svg").getroot()
+    words = [t.text for t in picture.iter("{http://www.w3.org/2000/svg}text")]
+    assert {"knee flexion", "ankle plantarflexion moment", "vertical force"} <= set(words)
+    lines = list(picture.iter("{http://www.w3.org/2000/svg}polyline"))
+    assert len(lines) == 11 + 12 + 8  # bands' means, the model's curves, the person's
+    width = float(picture.get("width"))
+    for line in lines:
+        x = [float(p.split(",")[0]) for p in line.get("points").split()]
+        assert 0 < min(x) < max(x) < width
+
+
 @pytest.mark.parametrize("by_side", [True, False])
 @pytest.mark.parametrize("size", [0.8, 1.0])
 def test_forces_of_the_same_walk_are_read(call, tmp_path, by_side, size):
@@ -108,6 +123,7 @@ def test_parts_heights_and_belts_that_the_user_knows(call, tmp_path):
         ("--cycle-time", "fast"),
         ("--convention", "mine"),
         ("--save", "walk.rrd"),
+        ("--plot", "walk.png"),
         ("--save", "w.mot"),
         ("--json", "no/where.json"),
     ],
@@ -200,6 +216,10 @@ CRAFTED = {
     "pickles": (pickled, "Python objects"),
     "words": (lambda: npz({"time": np.array(["one"] * 9)}), "numbers"),
     "a bomb": (bomb, "MB"),
+    "own rollouts": (
+        lambda: npz({n: np.zeros(9) for n in ("joints", "time", "q", "v", "u")}),
+        "recover --demonstration",
+    ),
     "columns of unequal length": (
         lambda: npz({"time": np.arange(9.0), "knee_angle_r": np.arange(8.0)}),
         "one length",

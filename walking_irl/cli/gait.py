@@ -30,7 +30,8 @@ def run(args: argparse.Namespace, console: Console) -> int:
     check_ending(args.save, ".npz", ".csv")
     check_ending(args.record, ".rrd")
     check_ending(args.png, ".png")
-    check_outputs([args.save, args.record, args.png, args.json])
+    check_ending(args.plot, ".svg")
+    check_outputs([args.save, args.record, args.png, args.plot, args.json])
     if not (np.isfinite(args.seconds) and args.seconds > 0):
         raise InvalidInputError(f"seconds must be a positive number, got {args.seconds}")
     domain = load(args.domain)
@@ -56,6 +57,8 @@ def run(args: argparse.Namespace, console: Console) -> int:
         from walking_irl.domains.humanoid.gait.pictures import strip
 
         write_file(args.png, png(strip(domain.walker, found)))
+    if args.plot is not None:
+        write_file(args.plot, _curves(domain.walker, found).encode())
     if args.record is not None:
         _record_walk(args.record, domain, found, args.seconds, w)
     if args.json is not None:
@@ -63,6 +66,19 @@ def run(args: argparse.Namespace, console: Console) -> int:
     if not args.quiet:
         _show_gait(content, console)
     return 0
+
+
+def _curves(walker: Any, found: Any) -> str:
+    """The gait's curves on the band of adults."""
+    from walking_irl.domains.humanoid.gait.curve_picture import curves_picture
+    from walking_irl.domains.humanoid.gait.curves import gait_curves
+    from walking_irl.domains.humanoid.gait.norm_curves import norm_set
+    from walking_irl.domains.humanoid.gait.realism import gait_cycle, leg_length
+
+    walks = {f"gait, {found.speed:.2f} m/s": gait_curves(gait_cycle(walker, found))}
+    norms = norm_set("adults", found.speed, leg_length(walker))
+    note = "adults at self-selected speed, mean and 1 s.d."
+    return curves_picture(f"Best gait of the {walker.name}", walks, norms, note)
 
 
 def png(picture: Any) -> bytes:

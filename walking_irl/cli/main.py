@@ -124,6 +124,7 @@ def _gait_parser(p: argparse.ArgumentParser) -> None:
     p.add_argument("--save", type=Path, metavar="FILE.npz|FILE.csv", help="write the gait cycle")
     p.add_argument("--record", type=Path, metavar="FILE.rrd", help="record the walk")
     p.add_argument("--png", type=Path, metavar="FILE.png", help="draw a picture strip")
+    p.add_argument("--plot", type=Path, metavar="FILE.svg", help="draw its curves on the norms")
     p.add_argument("--json", type=Path, metavar="FILE.json", help="write the gait's figures")
     p.add_argument("--quiet", action="store_true", help="print nothing but errors")
 

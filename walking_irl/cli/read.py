@@ -13,7 +13,7 @@ from rich.table import Table
 
 from walking_irl.cli import DONE
 from walking_irl.errors import InvalidInputError
-from walking_irl.files import check_ending, check_outputs
+from walking_irl.files import check_ending, check_outputs, write_file
 from walking_irl.run.report import write_json
 
 
@@ -37,6 +37,9 @@ def add_parser(commands: Any) -> argparse.ArgumentParser:
     p.add_argument("--cycle-time", type=float, metavar="S", help="for tables in percent of a cycle")
     p.add_argument("--convention", choices=("opensim", "clinical"), help="whose signs (by names)")
     p.add_argument("--save", type=Path, metavar="FILE.npz|FILE.csv", help="write the mean cycle")
+    p.add_argument(
+        "--plot", type=Path, metavar="FILE.svg", help="draw the curves on norms and the model"
+    )
     p.add_argument("--json", type=Path, metavar="FILE.json", help="write what was understood")
     p.add_argument("--quiet", action="store_true", help="print nothing but errors")
     return p
@@ -45,12 +48,16 @@ def add_parser(commands: Any) -> argparse.ArgumentParser:
 def run(args: argparse.Namespace, console: Console) -> int:
     """``walking-irl read``."""
     from walking_irl.domains.humanoid.body.load import load_walker
+    from walking_irl.domains.humanoid.gait.curves import likeness
     from walking_irl.domains.humanoid.gait.files import save_gait
+    from walking_irl.domains.humanoid.gait.realism import leg_length
     from walking_irl.domains.humanoid.recorded.person import Options
+    from walking_irl.domains.humanoid.recorded.person_curves import person_curves
     from walking_irl.domains.humanoid.recorded.reader import read_person
 
     check_ending(args.save, ".npz", ".csv")
-    check_outputs([args.save, args.json], inputs=args.files)
+    check_ending(args.plot, ".svg")
+    check_outputs([args.save, args.plot, args.json], inputs=args.files)
     options = Options(
         args.start, args.stop, args.height, args.belt, args.cycle_time, args.convention
     )
@@ -59,11 +66,33 @@ def run(args: argparse.Namespace, console: Console) -> int:
     person = read_person(args.files, walker, options)
     if args.save is not None:
         save_gait(args.save, person.gait, walker)
+    curves = person_curves(person, walker)
+    norms = likeness(curves, person.gait.speed, leg_length(walker))
+    if args.plot is not None:
+        write_file(args.plot, _picture(person, curves, walker).encode())
     if args.json is not None:
-        write_json(args.json, to_json(person))
+        write_json(args.json, {**to_json(person), "norms": norms})
     if not args.quiet:
-        _show(person, console)
+        _show(person, norms, console)
     return DONE
+
+
+def _picture(person: Any, curves: Any, walker: Any) -> str:
+    """The person, the model's reference gait, and the band of adults."""
+    from walking_irl.domains.humanoid.gait.curve_picture import curves_picture
+    from walking_irl.domains.humanoid.gait.curves import gait_curves
+    from walking_irl.domains.humanoid.gait.library import load_gaits
+    from walking_irl.domains.humanoid.gait.norm_curves import norm_set
+    from walking_irl.domains.humanoid.gait.realism import gait_cycle, leg_length
+
+    reference = load_gaits()["reference"]
+    walks = {
+        f"recorded, {person.speed:.2f} m/s": curves,
+        f"model, {reference.speed:.2f} m/s": gait_curves(gait_cycle(walker, reference)),
+    }
+    names = ", ".join(p.name for p in person.sources)
+    norms = norm_set("adults", person.gait.speed, leg_length(walker))
+    return curves_picture(names, walks, norms, "adults at self-selected speed, mean and 1 s.d.")
 
 
 def _check_numbers(args: argparse.Namespace) -> None:
@@ -95,7 +124,7 @@ def to_json(person: Any) -> dict[str, Any]:
     }
 
 
-def _show(person: Any, console: Console) -> None:
+def _show(person: Any, norms: dict[str, Any], console: Console) -> None:
     table = Table("figure", "value")
     rows = (
         ("file", f"{person.format}, {person.rate:.0f} Hz, {person.unit}, {person.convention}"),
@@ -116,6 +145,8 @@ def _show(person: Any, console: Console) -> None:
     )  # fmt: skip
     for name, value in rows:
         table.add_row(name, escape(value))
+    for name, norm in norms.items():
+        table.add_row(f"within 1 s.d. of {name}", f"{100 * norm['mean']:.0f} % of the cycle")
     console.print(table)
     for note in person.notes:
         console.print(f"note: {escape(note)}")

@@ -37,7 +37,7 @@ def humanoid_subject(domain: Humanoid, setup: Setup, executor: Executor | None) 
     if setup.expert == "suboptimal":
         made = domain.demonstrate_poorly(w_E, rng, executor)
         return Subject(made.expert, made.gait, w_E, made.expert.mu)
-    made = domain.demonstrate(w_E, rng, _trials(setup), executor)
+    made = domain.demonstrate(w_E, rng, _trials(setup, False), executor)
     return Subject(made.expert, made.gait, w_E, -made.optimum.total_costs, made.rollouts)
 
 
@@ -45,11 +45,12 @@ def humanoid_case(
     domain: Humanoid, setup: Setup, subject: Subject, executor: Executor | None
 ) -> Case:
     """The learner's tools for an expert that is known."""
+    is_exact = subject.expert.covariance is None
     case = Case(
         domain,
         subject,
         domain.learner(subject.expert, THREADS),
-        measure=domain.remeasure(_trials(setup), setup.seed, executor),
+        measure=domain.remeasure(_trials(setup, is_exact), setup.seed, executor),
         min_weight=MIN_WEIGHT,
     )
     case.watch = lambda f: setattr(case.forward, "on_step", f)
@@ -61,9 +62,8 @@ def humanoid_case(
     return case
 
 
-def _trials(setup: Setup) -> Trials:
-    """How the expert is recorded; a demonstration and a spoilt walk are known exactly."""
-    is_exact = setup.expert == "suboptimal" or setup.demonstration is not None
+def _trials(setup: Setup, is_exact: bool) -> Trials:
+    """How the expert is recorded; a gait that is given and a spoilt walk are known exactly."""
     return Trials(0 if is_exact else setup.rollouts, setup.noise, setup.disturbance)
 
 

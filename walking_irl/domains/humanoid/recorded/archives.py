@@ -68,7 +68,13 @@ def read_columns(path: Path) -> dict[str, Array]:
         InvalidInputError: As :func:`read_arrays`, or if an array does not hold numbers.
     """
     columns = {}
-    for name, array in read_arrays(path).items():
+    arrays = read_arrays(path)
+    if {"joints", "time", "q", "v", "u"} <= set(arrays):
+        raise InvalidInputError(
+            f"{path} holds rollouts that walking-irl recover has written: give it to "
+            "walking-irl recover --demonstration"
+        )
+    for name, array in arrays.items():
         if array.dtype.kind not in "fiub":
             raise InvalidInputError(
                 f"{path} is not a readable .npz table: {name} holds {array.dtype}, expected numbers"
