@@ -56,6 +56,7 @@ def test_a_file_may_start_at_any_frame(tmp_path, knots):
     )
 
 
+@pytest.mark.slow
 def test_many_frames_are_taken_as_they_are(tmp_path):
     """Splines through 1000 frames miss the gait by less than its contacts feel."""
     shown = demonstrated(write(tmp_path / "g.npz", n=1000), PLANAR)
