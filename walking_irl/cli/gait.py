@@ -15,7 +15,7 @@ from walking_irl.cli.weights import parse_weights, show_weights
 from walking_irl.domains import WALKERS, load_walker_domain
 from walking_irl.domains.weights import normalised
 from walking_irl.errors import InvalidInputError
-from walking_irl.files import check_ending, check_outputs, write_json, write_png
+from walking_irl.files import check_ending, check_outputs, write_file, write_json, write_png
 from walking_irl.workers import workers
 
 
@@ -35,6 +35,7 @@ def add_parser(commands: Any) -> argparse.ArgumentParser:
     p.add_argument("--save", type=Path, metavar="FILE.npz|FILE.csv", help="write the gait cycle")
     p.add_argument("--record", type=Path, metavar="FILE.rrd", help="record the rollout")
     p.add_argument("--png", type=Path, metavar="FILE.png", help="draw a picture strip")
+    p.add_argument("--plot", type=Path, metavar="FILE.svg", help="draw its curves on the norms")
     p.add_argument("--json", type=Path, metavar="FILE.json", help="write the gait's figures")
     p.add_argument("--quiet", action="store_true", help="print nothing but errors")
     return p
@@ -48,7 +49,8 @@ def run(args: argparse.Namespace, console: Console) -> int:
     check_ending(args.save, ".npz", ".csv")
     check_ending(args.record, ".rrd")
     check_ending(args.png, ".png")
-    check_outputs([args.save, args.record, args.png, args.json])
+    check_ending(args.plot, ".svg")
+    check_outputs([args.save, args.record, args.png, args.plot, args.json])
     if not (np.isfinite(args.seconds) and args.seconds > 0):
         raise InvalidInputError(f"seconds must be a positive number, got {args.seconds}")
     domain = load_walker_domain(args.domain)
@@ -71,6 +73,8 @@ def run(args: argparse.Namespace, console: Console) -> int:
         from walking_irl.domains.humanoid.gait.pictures import strip
 
         write_png(args.png, strip(domain.walker, found))
+    if args.plot is not None:
+        write_file(args.plot, _curves(domain.walker, found).encode())
     if args.record is not None:
         _record_walk(args.record, domain, found, args.seconds, w)
     if args.json is not None:
@@ -78,6 +82,19 @@ def run(args: argparse.Namespace, console: Console) -> int:
     if not args.quiet:
         _show_gait(content, console)
     return 0
+
+
+def _curves(walker: Any, found: Any) -> str:
+    """The gait's curves on the band of adults."""
+    from walking_irl.domains.humanoid.gait.curve_picture import curves_picture
+    from walking_irl.domains.humanoid.gait.curves import gait_curves
+    from walking_irl.domains.humanoid.gait.norm_curves import norm_set
+    from walking_irl.domains.humanoid.gait.realism import gait_cycle, leg_length
+
+    walks = {f"gait, {found.speed:.2f} m/s": gait_curves(gait_cycle(walker, found))}
+    norms = norm_set("adults", found.speed, leg_length(walker))
+    note = "adults at self-selected speed, mean and 1 s.d."
+    return curves_picture(f"Best gait of the {walker.name}", walks, norms, note)
 
 
 def _record_walk(path: Path, domain: Any, found: Any, seconds: float, w: Array) -> None:
@@ -109,4 +126,12 @@ def _show_gait(content: dict[str, Any], console: Console) -> None:
         table.add_row(name.replace("_", " "), f"{content[name]:.4g} {unit}")
     for name, value in zip(content["objectives"], content["mu"], strict=True):
         table.add_row(f"mu {name}", f"{value:.5f}")
+    for group, value in content["groups"].items():
+        table.add_row(f"realism: {group.replace('_', ' ')}", f"{value:.3f}")
+    met = content["bands"]
+    table.add_row("bands met", f"{sum(met.values())} of {len(met)}")
+    for name, norm in content["norms"].items():
+        table.add_row(f"within 1 s.d. of {name}", f"{100 * norm['mean']:.0f} % of the cycle")
+        for curve, share in norm["curves"].items():
+            table.add_row(f"  {curve.replace('_', ' ')}", f"{100 * share:.0f} %")
     console.print(table)

@@ -1,4 +1,4 @@
-"""The command line: ``walking-irl recover | gait | tables | inspect | view | domains``.
+"""The command line: ``walking-irl recover | gait | read | tables | inspect | view | domains``.
 
 Exit codes: 0 done, 1 the method ended without success (it says why), 2 bad input or a failed write,
 130 interrupted (what was done so far is saved).
@@ -22,7 +22,7 @@ from walking_irl import __version__
 from walking_irl.cli import BAD_INPUT, FAILED, INTERRUPTED
 from walking_irl.errors import EmptyPolyhedronError, InvalidInputError, WalkingIRLError
 
-COMMANDS = ("recover", "gait", "tables", "inspect", "view", "domains")
+COMMANDS = ("recover", "gait", "read", "tables", "inspect", "view", "domains")
 """One module of this package each, with ``add_parser`` and ``run``."""
 EXAMPLES = """
 examples:
@@ -31,6 +31,7 @@ examples:
   walking-irl recover --weights 1,1,1,1,1,4    ground-truth weights of your own
   walking-irl recover --resume walking.checkpoint.npz --max-solves 40
   walking-irl gait --weights 1,2,1,1,1,5 --png gait.png
+  walking-irl read trial1.mot trial2.mot       what a recording of a person says
   walking-irl inspect walking.rrd
   walking-irl view walking.rrd
 """

@@ -27,8 +27,8 @@ from walking_irl.domains.humanoid.closed_loop.policy import tracking_policy
 from walking_irl.domains.humanoid.closed_loop.rollout import averaged_gait
 from walking_irl.domains.humanoid.closed_loop.trials import MANY, Measurement, Trials, measure
 from walking_irl.domains.humanoid.costs.defaults import DEFAULT_COSTS, Costs
+from walking_irl.domains.humanoid.demonstrations import demonstrated
 from walking_irl.domains.humanoid.expert_search import OptimalGait, best_gait
-from walking_irl.domains.humanoid.gait.files import load_gait
 from walking_irl.domains.humanoid.gait.gait import Gait, cycle_motion
 from walking_irl.domains.humanoid.learner import WarmStartSolver, search, solver_for
 from walking_irl.domains.humanoid.optimiser.solver import Solution
@@ -36,7 +36,7 @@ from walking_irl.domains.humanoid.optimiser.stages import stage
 from walking_irl.domains.humanoid.options import OPTIONS, RECORDING
 from walking_irl.domains.humanoid.population import POPULATIONS
 from walking_irl.domains.humanoid.spec import WalkerSpec
-from walking_irl.errors import InvalidInputError, SolverError
+from walking_irl.errors import SolverError
 from walking_irl.expert import expert_from_returns
 from walking_irl.types import Expert, Objective, Response, Rollout
 
@@ -44,8 +44,6 @@ THREADS = 2
 """Threads of one learner's solve: solves follow one another, so the cores would idle."""
 MIN_WEIGHT = 0.005
 """The learner's lower bound of every weight; the gait of a vanishing weight is ill-defined."""
-PHYSICAL = 0.05
-"""Largest root force of a demonstration [body weights]: more is not this body's walk."""
 SUBOPTIMAL_BY = np.deg2rad(1.0)
 """First amplitude of the perturbation that makes a gait worse [rad]."""
 WORSE = (0.01, 0.10)
@@ -197,21 +195,13 @@ class Humanoid:
         )
 
     def read_demonstration(self, path: Path) -> Demonstration:
-        """A gait from a file, known exactly.
+        """A gait known exactly, or recorded rollouts, from a file of this product.
 
         Raises:
-            InvalidInputError: If it cannot be read, or is no gait that this body can walk.
+            InvalidInputError: If it cannot be read, or is no walk of this body.
         """
-        gait = load_gait(path, self.walker)
-        evaluation = solver_for(self.spec).problem.evaluate(gait.to_vector())
-        worst = float(np.abs(evaluation.root).max())
-        if not worst < PHYSICAL:
-            raise InvalidInputError(
-                f"{path} is not a walk of this body: its root would need {worst:.2g} body weights "
-                f"of external force (at most {PHYSICAL}); give a gait saved by walking-irl gait "
-                "--save"
-            )
-        return Demonstration(exact_expert(gait, evaluation.total_costs()), gait)
+        shown = demonstrated(path, self.spec)
+        return Demonstration(shown.expert, shown.gait, trajectories=shown.rollouts)
 
     def learner(
         self,

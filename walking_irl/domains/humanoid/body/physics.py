@@ -34,6 +34,24 @@ def inverse_dynamics(walker: Walker, q: Array, v: Array, a: Array) -> tuple[Arra
     return force, sensors
 
 
+def passive_forces(walker: Walker, q: Array, v: Array) -> Array:
+    """Forces of joints' springs and dampers (n, nv) [N, Nm] of a motion.
+
+    Args:
+        walker: Who moves.
+        q: Joint positions [m, rad], shape (n, nv).
+        v: Joint velocities, shape (n, nv).
+    """
+    data = mujoco.MjData(walker.model)
+    force = np.empty_like(q)
+    for k in range(len(q)):
+        data.qpos[:], data.qvel[:] = q[k], v[k]
+        mujoco.mj_fwdPosition(walker.model, data)
+        mujoco.mj_fwdVelocity(walker.model, data)
+        force[k] = data.qfrc_passive
+    return force
+
+
 class WalkerPhysics(dm_mujoco.Physics):  # type: ignore[misc]
     """MuJoCo's simulation of a walker, whose steps check for trouble in a fifth of the time."""
 

@@ -48,7 +48,9 @@ class Evaluation(NamedTuple):
     objective_costs: Array
     """Scaled costs F_j / scale_j, shape (K,)."""
     shared: float
-    """Fixed part without the root penalty."""
+    """Fixed part without the root penalty and the anchors of the cycle."""
+    anchoring: float
+    """What fixes where the cycle starts: the solver's alone, in nobody's features."""
     root_square: float
 
     def total_costs(self) -> Array:
@@ -57,7 +59,9 @@ class Evaluation(NamedTuple):
 
     def total(self, w: Array, penalty: float) -> float:
         """What the solver minimises at weights ``w`` and a given root penalty."""
-        return float(w @ self.objective_costs + self.shared + penalty * self.root_square)
+        return float(
+            w @ self.objective_costs + self.shared + self.anchoring + penalty * self.root_square
+        )
 
 
 class Transcription:
@@ -178,6 +182,8 @@ class Transcription:
         period = gait.half_period
         anchors = np.array([q[0, 0], left - right, min(0, period - low) + max(0, period - high)])
         costs, shared = self.stack.costs_of(r, motion.pace)
-        shared += float(ANCHOR_WEIGHTS @ anchors**2)
+        pulls = ANCHOR_WEIGHTS * anchors**2
+        shared += float(pulls[2])
+        anchoring = float(pulls[:2].sum())
         root_square = float(np.sum(root * root) / self.n_knots)
-        return Evaluation(x, motion, r, root, anchors, costs, shared, root_square)
+        return Evaluation(x, motion, r, root, anchors, costs, shared, anchoring, root_square)
