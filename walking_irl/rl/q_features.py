@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,7 +11,8 @@ from walking_irl.errors import SolverError
 from walking_irl.rl.finite_mdp import Actions
 
 
-class BlockFeatures(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class BlockFeatures:
     """State features, once per action: psi(s) stands in block a, zeros elsewhere; p = A d."""
 
     psi: Array
@@ -31,7 +32,8 @@ class BlockFeatures(NamedTuple):
         return np.asarray(Q.argmax(axis=1), dtype=np.intp)
 
 
-class QuadraticFeatures(NamedTuple):
+@dataclass(frozen=True)
+class QuadraticFeatures:
     """All products of two coordinates of (x, u), and optionally a constant.
 
     Q(x, u) = (x, u)' H (x, u) + c is exact for linear-quadratic worlds; c is needed where the
