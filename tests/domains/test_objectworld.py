@@ -4,6 +4,7 @@ import pytest
 from walking_irl.domains.mdp.objectworld import MOVES, Objectworld
 from walking_irl.domains.mdp.random_mdp import RandomMDP
 from walking_irl.errors import InvalidInputError
+from walking_irl.rl.tabular import loss
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -72,6 +73,32 @@ def test_random_mdp_branches_as_stated():
     assert world.mdp.Phi.min() >= 0
     assert world.mdp.Phi.max() <= 1
     assert np.abs(rows - RandomMDP(30, 3, 4, branching=6, seed=6).mdp.T.toarray()).max() > 0
+
+
+def test_own_experts_are_the_best_and_a_soft_one_that_loses_a_little():
+    losses = []
+    for seed in range(5):
+        world = Objectworld(16, seed=seed)
+        assert loss(world.mdp, world.reward, world.own_policy()) == pytest.approx(0.0, abs=1e-9)
+        soft, cold = world.own_policy(1.0), world.own_policy(0.1)
+        losses.append(loss(world.mdp, world.reward, soft))
+        assert 0 < loss(world.mdp, world.reward, cold) < losses[-1]
+    assert np.mean(losses) == pytest.approx(0.1, abs=0.05)  # worlds differ by as much
+    with pytest.raises(InvalidInputError, match="temperature"):
+        world.own_policy(-1.0)
+
+
+@pytest.mark.parametrize("make", [Objectworld, RandomMDP])
+def test_suboptimal_experts_are_soft(make):
+    world, rng = make(), np.random.default_rng(0)
+    w = rng.dirichlet(np.ones(len(world.objectives)))
+    expert = world.suboptimal_expert(w, rng)
+    policy = expert.demonstration
+    assert policy.min() > 0
+    np.testing.assert_allclose(policy.sum(axis=1), 1.0)
+    np.testing.assert_allclose(world.mdp.feature_expectations(policy), expert.mu)
+    assert 0.01 < loss(world.mdp, world.mdp.reward(w), policy) < 0.4
+    np.testing.assert_array_equal(world.unpack(world.pack(policy)), policy)
 
 
 @pytest.mark.parametrize(

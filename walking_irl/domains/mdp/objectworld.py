@@ -12,9 +12,13 @@ import numpy as np
 from walking_irl.arrays import Array, Indices
 from walking_irl.domains.mdp.finite import FiniteDomain
 from walking_irl.domains.mdp.grid import grid_transitions
+from walking_irl.domains.mdp.soft_expert import soft_expert
+from walking_irl.domains.weights import checked_weights
 from walking_irl.errors import InvalidInputError
 from walking_irl.rl.finite_mdp import Actions, FiniteMDP
-from walking_irl.types import Objective
+from walking_irl.rl.soft import soft_policy
+from walking_irl.rl.tabular import best_policy
+from walking_irl.types import Expert, Objective
 
 MOVES = np.array([(0, 0), (0, 1), (0, -1), (1, 0), (-1, 0)])
 """(row, column) steps of the five actions: stay, right, left, down, up."""
@@ -43,7 +47,7 @@ class ObjectPicture(NamedTuple):
     """What a viewer needs to draw a policy of an Objectworld; row 0 is at the top."""
 
     arrows: Array
-    """(row, column) step of the action chosen in each cell, shape (size, size, 2)."""
+    """Mean (row, column) step of the actions in each cell, shape (size, size, 2)."""
     visits: Array
     """Discounted expected visits of each cell, shape (size, size)."""
     reward: Array
@@ -100,10 +104,27 @@ class Objectworld(FiniteDomain):
         mdp = FiniteMDP(T, Phi, np.full(S, 1 / S), discount)
         super().__init__("objectworld", _objectives(size, colours, features), mdp, method)
 
-    def picture(self, policy: Actions) -> ObjectPicture:
-        """Arrows and visits of a policy, shape (S,), and the world's own reward."""
+    def suboptimal_expert(self, w_E: Array, rng: np.random.Generator) -> Expert:
+        """Expert that weighs actions by exp(20 Q), unknown to the learner."""
+        return soft_expert(self.mdp, checked_weights(w_E, len(self.objectives)))
+
+    def own_policy(self, temperature: float = 0.0) -> Array | Actions:
+        """How an expert of the world's own reward acts.
+
+        Args:
+            temperature: 0 for the best policy, deterministic (S,); above, the soft-optimal policy
+                of reward / temperature, shape (S, A). Levine et al. demonstrate with 1.
+        """
+        if temperature == 0:
+            return best_policy(self.mdp, self.reward).pi
+        if not 0 < temperature < np.inf:
+            raise InvalidInputError(f"temperature must be finite and >= 0, got {temperature}")
+        return soft_policy(self.mdp, self.reward / temperature).pi
+
+    def picture(self, policy: Array | Actions) -> ObjectPicture:
+        """Mean steps and visits of a policy, (S,) or (S, A), and the world's own reward."""
         shape = (self.size, self.size)
-        arrows = MOVES[policy].astype(float).reshape(*shape, 2)
+        arrows = (self.mdp.probabilities(policy) @ MOVES).reshape(*shape, 2)
         visits = self.mdp.visits(policy).reshape(shape)
         return ObjectPicture(arrows, visits, self.reward.reshape(shape))
 

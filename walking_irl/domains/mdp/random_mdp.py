@@ -8,10 +8,13 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
+from walking_irl.arrays import Array
 from walking_irl.domains.mdp.finite import FiniteDomain
+from walking_irl.domains.mdp.soft_expert import soft_expert
+from walking_irl.domains.weights import checked_weights
 from walking_irl.errors import InvalidInputError
 from walking_irl.rl.finite_mdp import FiniteMDP
-from walking_irl.types import Objective
+from walking_irl.types import Expert, Objective
 
 
 class RandomMDP(FiniteDomain):
@@ -55,6 +58,10 @@ class RandomMDP(FiniteDomain):
             for i in range(n_objectives)
         )
         super().__init__("random-mdp", objectives, FiniteMDP(T, Phi, start, discount), method)
+
+    def suboptimal_expert(self, w_E: Array, rng: np.random.Generator) -> Expert:
+        """Expert that weighs actions by exp(20 Q), unknown to the learner."""
+        return soft_expert(self.mdp, checked_weights(w_E, len(self.objectives)))
 
 
 def _transitions(S: int, A: int, branching: int, rng: np.random.Generator) -> sparse.csr_array:
