@@ -70,6 +70,10 @@ class Task:
         """The job as JSON types."""
         return asdict(self)
 
+    def run(self) -> dict[str, Any]:
+        """See :func:`run_task`."""
+        return run_task(self)
+
 
 class State(NamedTuple):
     """What a method holds after a forward solve."""
