@@ -43,6 +43,18 @@ def _driving(**options: Any) -> Any:
     return Driving(**options)
 
 
+def _objectworld(**options: Any) -> Any:
+    from walking_irl.domains.mdp.objectworld import Objectworld
+
+    return Objectworld(**options)
+
+
+def _random_mdp(**options: Any) -> Any:
+    from walking_irl.domains.mdp.random_mdp import RandomMDP
+
+    return RandomMDP(**options)
+
+
 def _walking_path(**options: Any) -> Any:
     from walking_irl.domains.path.walking_path import WalkingPath
 
@@ -59,6 +71,8 @@ DOMAINS: dict[str, Entry] = {
     "gridworld": Entry(
         _gridworld, "16 x 16 cells, 9 patches", "policy iteration, exact linear solves"
     ),
+    "objectworld": Entry(_objectworld, "16 x 16 cells, coloured objects", "policy iteration"),
+    "random-mdp": Entry(_random_mdp, "50 states, random transitions", "policy iteration"),
     "driving": Entry(_driving, "three-lane road, 1531 states", "policy iteration"),
     "walking-path": Entry(
         _walking_path, "walking paths seen from above", "optimal control, exact sensitivities"

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy import sparse
 
 from walking_irl.arrays import Array
 from walking_irl.errors import InvalidInputError
 from walking_irl.expert import expert_from_returns
 from walking_irl.rl.finite_mdp import Actions, FiniteMDP
+from walking_irl.rl.generative import next_states
 from walking_irl.rl.tabular import checked_policy
 from walking_irl.types import Expert
 
@@ -153,16 +153,10 @@ def demonstrate(
         raise InvalidInputError(f"need at least one trajectory of one step, got {n} of {horizon}")
     S, A = mdp.n_states, mdp.n_actions
     chances = np.cumsum(mdp.probabilities(checked_policy(mdp, policy)), axis=1)
-    T = sparse.csr_array(mdp.T)
-    ends = np.cumsum(T.data)  # running sums over all rows: row i begins at ends[indptr[i] - 1]
-    before = np.r_[0.0, ends][T.indptr]
     s = rng.choice(S, size=n, p=mdp.start if start is None else start)
     states, actions = np.empty((2, n, horizon), dtype=np.intp)
     for t in range(horizon):
         a = (chances[s] < rng.random(n)[:, None]).sum(axis=1).clip(max=A - 1)
         states[:, t], actions[:, t] = s, a
-        row = a * S + s
-        level = before[row] + rng.random(n) * (before[row + 1] - before[row])
-        entry = np.searchsorted(ends, level, side="right")
-        s = T.indices[np.clip(entry, T.indptr[row], T.indptr[row + 1] - 1)]
+        s = next_states(mdp, s, a, rng)
     return Demonstrations(states, actions)
