@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from problems import TWO_POLICIES
 
+from walking_irl.domains import load
 from walking_irl.errors import InvalidInputError
 from walking_irl.experiments import (
     TABLES,
@@ -24,7 +25,7 @@ from walking_irl.experiments.cutting import cutting_planes, utopia
 from walking_irl.experiments.picture import solves_chart, steps_chart
 from walking_irl.experiments.runner import Row, Runner
 from walking_irl.experiments.table import COLUMNS
-from walking_irl.experiments.tasks import Task, hidden_expert, make_domain, run_task
+from walking_irl.experiments.tasks import Task, run_task, synthetic_expert
 from walking_irl.geometry.centres import centre_rule
 from walking_irl.geometry.game import game_lp
 from walking_irl.types import Expert
@@ -207,7 +208,7 @@ def test_output_that_is_a_file_is_named(tmp_path):
 
 
 @pytest.mark.parametrize(("n", "solves"), [(5, 10), (8, 13)])
-def test_one_policy_dominates_every_clearly_suboptimal_regulator(n, solves):
+def test_one_policy_dominates_every_clearly_suboptimal_lqr_expert(n, solves):
     """Mean solves over 10 experts by cuts alone, Algorithm 3 beside it; fewer with Newton steps."""
     options = {"n_objectives": n, "perturbation": 0.25}
     task = Task("lqr", options, criterion="dominance", least_advantage=0.002)
@@ -231,12 +232,12 @@ def test_one_policy_dominates_every_clearly_suboptimal_regulator(n, solves):
 
 def test_experts_are_drawn_until_one_is_clearly_suboptimal():
     task = Task("lqr", {"n_objectives": 3, "perturbation": 0.25}, criterion="dominance")
-    domain = make_domain("lqr", task.options)
+    domain = load("lqr", **task.options)
     for seed in range(5):
         strict = replace(task, least_advantage=0.002, seed=seed)
-        expert, n_drawn = hidden_expert(strict, domain, np.random.default_rng(seed))[1:]
+        expert, n_drawn = synthetic_expert(strict, domain, np.random.default_rng(seed))[1:]
         assert domain.advantage(expert.mu) >= 0.002 * np.abs(expert.mu).mean()
-        first, one = hidden_expert(task, domain, np.random.default_rng(seed))[1:]
+        first, one = synthetic_expert(task, domain, np.random.default_rng(seed))[1:]
         assert one == 1 and (n_drawn == 1) == bool((first.mu == expert.mu).all())
     optimal = domain.forward(np.array([0.2, 0.3, 0.5])).mu
     assert domain.advantage(optimal) == pytest.approx(0.0, abs=1e-9)

@@ -8,7 +8,7 @@ from html import escape
 from itertools import groupby
 from typing import NamedTuple
 
-OURS, RIVAL, FAINT, INK = "#3b6fb6", "#9a9a9a", "#e2e2e2", "#222222"
+OURS, BASELINE, FAINT, INK = "#3b6fb6", "#9a9a9a", "#e2e2e2", "#222222"
 ROW, LABELS, PLOT, RESULT = 20, 270, 420, 90
 """Height of a row; widths of labels, of the plot and of the results beside it [px]."""
 
@@ -37,7 +37,7 @@ def solves_chart(title: str, rows: Sequence[Sequence[str]]) -> str:
         y += ROW + 2
         for _, method, mean, error, success in group:
             n, total = success.split("/")
-            colour = OURS if method.startswith("CPIRL") else RIVAL
+            colour = OURS if method.startswith("CPIRL") else BASELINE
             fill = colour if n == total else "white"
             middle = y + ROW / 2
             body.append(_text(LABELS - 8, middle + 4, method, anchor="end"))
@@ -123,7 +123,7 @@ def loss_chart(title: str, bars: Sequence[Loss], caption: str) -> str:
         body.append(_text(8, y + 14, setting, weight="bold"))
         y += ROW + 2
         for bar in group:
-            colour = OURS if bar.method.startswith("CPIRL") else RIVAL
+            colour = OURS if bar.method.startswith("CPIRL") else BASELINE
             middle = y + ROW / 2
             body.append(_text(LABELS - 8, middle + 4, bar.method, anchor="end"))
             body.append(

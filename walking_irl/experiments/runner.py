@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, as_completed
 from dataclasses import dataclass, replace
@@ -14,6 +13,7 @@ from typing import Any, Protocol
 
 from walking_irl.experiments.table import COLUMNS, Table, machine, summary
 from walking_irl.experiments.tasks import Task
+from walking_irl.files import write_file
 from walking_irl.versions import versions
 
 Progress = Callable[[str, int, int], None]
@@ -23,7 +23,7 @@ Progress = Callable[[str, int, int], None]
 NOTES = (
     "Solves end with the first success, or with the method's own end or budget.",
     "Time in queries is all but the forward solves; for CPIRL it includes the weight intervals of "
-    "every iteration, which no rival computes.",
+    "every iteration, which no baseline computes.",
     "|dw| is that of CPIRL's estimate after the last solve (its next centre or Newton step); where "
     "there is no estimate, that of the last query.",
     "n/a in a column: the method has no such figure (signed weights are no estimate on the "
@@ -145,6 +145,4 @@ class Runner:
         if path is None:
             return
         path.parent.mkdir(parents=True, exist_ok=True)
-        part = path.with_suffix(".part")
-        part.write_text(json.dumps(outcome))
-        os.replace(part, path)
+        write_file(path, json.dumps(outcome).encode())

@@ -15,7 +15,7 @@ import numpy as np
 
 from walking_irl.arrays import Array
 from walking_irl.experiments.picture import solves_chart, steps_chart
-from walking_irl.run.report import write_json
+from walking_irl.files import write_file, write_json
 from walking_irl.versions import versions
 
 COLUMNS = (
@@ -82,22 +82,16 @@ class Table:
         """Write ``table_<name>.md``, ``.csv``, ``.json`` and ``.svg``; returns their paths."""
         stem = folder / f"table_{self.name.replace('.', '_')}"
         paths = [stem.with_suffix(s) for s in (".md", ".csv", ".json", ".svg")]
-        _write(paths[0], self.to_markdown())
-        _write(paths[1], self.to_csv())
+        write_file(paths[0], self.to_markdown().encode())
+        write_file(paths[1], self.to_csv().encode())
         content = {k: getattr(self, k) for k in ("name", "title", "columns", "rows", "notes")}
         write_json(paths[2], {**content, "header": self.header, "outcomes": list(self.raw)})
-        _write(paths[3], self.picture())
+        write_file(paths[3], self.picture().encode())
         return paths
 
 
 def _markdown(cells: Sequence[str]) -> str:
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
-
-
-def _write(path: Path, text: str) -> None:
-    part = path.with_name(path.name + ".part")
-    part.write_text(text)
-    os.replace(part, path)
 
 
 def machine() -> dict[str, Any]:
