@@ -115,7 +115,7 @@ def test_intervals_of_a_complete_policy_hold_the_truth():
     every = Demonstrations(np.arange(50)[:, None], pi[:, None])
     low, high = cpirl_actions(mdp, every, rng=rng).info["intervals"].T
     assert (low - 1e-6 <= w).all() and (w <= high + 1e-6).all()
-    assert (high - low).max() < 0.5
+    assert (high - low).max() < 0.8  # of 1: cuts from every side
 
 
 def test_bad_demonstrations_are_named():
