@@ -19,17 +19,15 @@ import numpy as np
 from bench import table, verdict
 
 from walking_irl.cpirl.loop import cpirl
+from walking_irl.domains.contract import Request
 from walking_irl.domains.humanoid import domain as domain_module
-from walking_irl.domains.humanoid import solver as gait_solver
-from walking_irl.domains.humanoid.closed_loop.trials import Protocol, measure
+from walking_irl.domains.humanoid.closed_loop.trials import measure
 from walking_irl.domains.humanoid.domain import Humanoid, exact_expert
 from walking_irl.domains.humanoid.gait.library import load_library
+from walking_irl.domains.humanoid.optimiser import solver as gait_solver
 from walking_irl.domains.humanoid.optimiser.linearisation import Linearisation
 from walking_irl.domains.humanoid.optimiser.normal_equations import Factor, NormalMatrix
 from walking_irl.domains.humanoid.optimiser.transcription import Transcription
-from walking_irl.domains.humanoid.population import typical_weights
-from walking_irl.run.case import MAX_SOLVES
-from walking_irl.run.humanoid_case import MIN_WEIGHT
 from walking_irl.run.session import PROBE
 from walking_irl.types import Expert, Iteration
 
@@ -99,12 +97,13 @@ def timers(clock: Clock) -> Iterator[None]:
             patch.stop()
 
 
-def make_expert(clock: Clock, domain: Humanoid, protocol: Protocol, seed: int) -> Expert:
-    """The expert of hidden weights, timed."""
+def make_expert(clock: Clock, domain: Humanoid, rollouts: int, seed: int) -> Expert:
+    """The expert of drawn weights, timed."""
     rng = np.random.default_rng(seed)
     with timers(clock), mock.patch.object(domain_module, "measure", clock.wrap(MEASURE, measure)):
         with clock.part(REST):
-            return domain.demonstrate(typical_weights(rng), rng, protocol).expert
+            request = Request(options={"rollouts": rollouts})
+            return domain.demonstrate(request, rng=rng).expert
 
 
 def shipped_expert(domain: Humanoid) -> Expert:
@@ -114,17 +113,19 @@ def shipped_expert(domain: Humanoid) -> Expert:
 
 
 def recover(
-    clock: Clock, domain: Humanoid, expert: Expert, protocol: Protocol, seed: int, max_solves: int
+    clock: Clock, domain: Humanoid, expert: Expert, rollouts: int, seed: int, max_solves: int
 ) -> list[Iteration]:
     """One recovery, timed."""
-    remeasure = domain.remeasure(protocol, seed)
+    rng = np.random.default_rng([seed, 1])
+    learner = domain.learner(expert, {"rollouts": rollouts}, rng=rng)
+    measured = learner.measure
     steps = cpirl(
-        clock.wrap(REST, domain.learner(expert)),
+        clock.wrap(REST, learner.forward),
         expert,
         max_solves=max_solves,
-        min_weight=MIN_WEIGHT,
+        min_weight=domain.defaults.min_weight,
         rng=np.random.default_rng(seed),
-        measure=None if remeasure is None else clock.wrap(MEASURE, remeasure),
+        measure=None if measured is None else clock.wrap(MEASURE, measured),
         probe=PROBE,
     )
     with timers(clock), clock.part(QUERIES):
@@ -152,7 +153,7 @@ def report(expert: Clock, learner: Clock, steps: list[Iteration]) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seed", type=int, default=100, help="draws the hidden weights")
+    parser.add_argument("--seed", type=int, default=100, help="draws the ground-truth weights")
     parser.add_argument("--rollouts", type=int, default=20, help="of the expert; 0: exact features")
     parser.add_argument("--planar", action="store_true")
     parser.add_argument(
@@ -160,14 +161,14 @@ def main() -> None:
     )
     args = parser.parse_args()
     domain = Humanoid(args.planar or args.quick)
-    protocol = Protocol(0 if args.quick else args.rollouts)
+    rollouts = 0 if args.quick else args.rollouts
     expert_clock, clock = Clock(), Clock()
     if args.quick:
         expert = shipped_expert(domain)
     else:
-        expert = make_expert(expert_clock, domain, protocol, args.seed)
-    max_solves = 2 if args.quick else MAX_SOLVES
-    steps = recover(clock, domain, expert, protocol, args.seed, max_solves)
+        expert = make_expert(expert_clock, domain, rollouts, args.seed)
+    max_solves = 2 if args.quick else domain.defaults.max_solves
+    steps = recover(clock, domain, expert, rollouts, args.seed, max_solves)
     print(f"{domain.name}, seed {args.seed}, one process, one thread\n")
     print(report(expert_clock, clock, steps))
 

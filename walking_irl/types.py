@@ -9,7 +9,7 @@ from __future__ import annotations
 import enum
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal, NamedTuple, Protocol, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -156,26 +156,3 @@ class Rollout:
     a: Array
     u: Array
     sensors: Array
-
-
-class Domain(Protocol):
-    """A world with objectives, and a solver for the best policy under given weights."""
-
-    name: str
-    objectives: tuple[Objective, ...]
-
-    def forward(self, w: Array) -> Response:
-        """Solve "best policy for w"; deterministic; knows nothing of any expert."""
-        ...
-
-    def expert(self, w_E: Array, rng: np.random.Generator) -> Expert:
-        """Synthetic expert for hidden weights, solved at least as hard as any learner's query."""
-        ...
-
-    def pack(self, policy: Any) -> Array:
-        """A policy as one array, for files."""
-        ...
-
-    def unpack(self, packed: Array) -> Any:
-        """Inverse of :meth:`pack`."""
-        ...

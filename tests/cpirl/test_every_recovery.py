@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from walking_irl.geometry.centres import CENTRES
-from walking_irl.run.case import Setup
 from walking_irl.run.report import SUCCESS
 from walking_irl.run.session import run
+from walking_irl.run.setup import Setup
 from walking_irl.types import MODES, Status
 
 slow = pytest.mark.slow

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from small_mdps import measure
 
-from walking_irl.domains.humanoid.closed_loop.trials import Protocol
+from walking_irl.domains.contract import Request
 from walking_irl.domains.humanoid.domain import Humanoid
 from walking_irl.domains.lqr import LQR
 from walking_irl.domains.mdp.driving import Driving
@@ -92,7 +92,8 @@ def test_expert_is_at_least_as_good_as_any_answer(domain):
     rng = np.random.default_rng(4)
     w_E = weights(domain, 1, seed=4)[0]
     if isinstance(domain, Humanoid):  # a search among local optima admits a gap of its own
-        expert = domain.demonstrate(w_E, rng, Protocol(rollouts=0)).expert
+        request = Request(w_E, options={"rollouts": 0})
+        expert = domain.demonstrate(request, rng=rng).expert
         assert 0.0 < expert.suboptimality <= 1e-4 * np.abs(expert.mu).mean()
     else:
         expert = domain.expert(w_E, rng)

@@ -16,13 +16,14 @@ import rerun_cli
 from walking_irl.arrays import Array
 from walking_irl.cpirl.loop import cpirl
 from walking_irl.cpirl.summary import summarise
+from walking_irl.domains.contract import Truth
 from walking_irl.domains.humanoid.body.anatomy import load_walker
 from walking_irl.domains.humanoid.gait.gait import Gait, cycle_motion
 from walking_irl.domains.lqr import LQR
 from walking_irl.errors import InvalidInputError, RecordingError
-from walking_irl.files import model_path
+from walking_irl.files import check_writable, model_path
 from walking_irl.geometry.polyhedron import WeightPolyhedron
-from walking_irl.recording import Experiment, Recorder, check_writable, record_motion
+from walking_irl.recording import Experiment, Recorder, record_motion
 from walking_irl.recording.hulls import faces_lost, hull
 from walking_irl.recording.panels import panels
 from walking_irl.recording.reader import Recording, check_recording, inspect_recording
@@ -95,7 +96,7 @@ def run(K: int, n: int = 4, seed: int = 0) -> tuple[Experiment, list[Iteration]]
         )  # fmt: skip
         polyhedron = after
     expert = Expert(mu_E, np.zeros(K))
-    return Experiment("toy", objectives(K), expert, seed=seed, w_expert=w_E), iterations
+    return Experiment("toy", objectives(K), expert, seed=seed, truth=Truth(w_E, mu_E)), iterations
 
 
 def record(path: Path, model: mujoco.MjModel, K: int = 6) -> list[Iteration]:
@@ -230,7 +231,7 @@ def test_weakest_direction_and_noise_are_told_where_they_are_known(tmp_path: Pat
     problem, w_E = LQR(3), np.array([0.2, 0.3, 0.5])
     mu = problem.forward(w_E).mu
     expert = Expert(mu, 0.02 * np.abs(mu), n_samples=7)
-    experiment = Experiment("lqr", problem.objectives, expert, w_expert=w_E)
+    experiment = Experiment("lqr", problem.objectives, expert, truth=Truth(w_E, mu))
     iterations = list(cpirl(problem.forward, expert, rng=np.random.default_rng(0), max_solves=3))
     with Recorder(tmp_path / "a.rrd", experiment) as recorder:
         for it in iterations:
@@ -243,11 +244,11 @@ def test_weakest_direction_and_noise_are_told_where_they_are_known(tmp_path: Pat
     assert "known from 7 recorded walks to within 2 % each" in text
 
 
-def test_summary_tells_hidden_and_recovered_weights(recorded: Recording) -> None:
+def test_summary_tells_true_and_recovered_weights(recorded: Recording) -> None:
     experiment, iterations = run(6)
     assert experiment.w_expert is not None
-    for hidden, found in zip(experiment.w_expert, iterations[-1].estimate, strict=True):
-        assert f"| {hidden:.4f} | {found:.4f} |" in recorded.summary
+    for true, found in zip(experiment.w_expert, iterations[-1].estimate, strict=True):
+        assert f"| {true:.4f} | {found:.4f} |" in recorded.summary
     assert "cut short" not in recorded.summary
 
 
@@ -363,11 +364,11 @@ def test_one_motion_alone_is_recorded(tmp_path: Path, model: mujoco.MjModel) -> 
 
 def test_unwritable_targets_are_found_before_the_run(tmp_path: Path) -> None:
     experiment = run(3)[0]
-    with pytest.raises(RecordingError, match="does not exist; create it"):
+    with pytest.raises(RecordingError, match="no folder .*; create it"):
         Recorder(tmp_path / "missing" / "a.rrd", experiment)
-    with pytest.raises(RecordingError, match="expected a file name, got the directory"):
+    with pytest.raises(RecordingError, match="it is a folder; name a file"):
         Recorder(tmp_path, experiment)
-    with pytest.raises(RecordingError, match="got the device /dev/full"):
+    with pytest.raises(RecordingError, match="/dev/full: it is a device"):
         Recorder("/dev/full", experiment)
     assert os.listdir(tmp_path) == []
 
@@ -379,8 +380,8 @@ def test_read_only_directory_is_found_before_the_run(
         raise PermissionError(errno.EACCES, "Permission denied")
 
     monkeypatch.setattr(Path, "open", refuse)  # root may write everywhere
-    with pytest.raises(RecordingError, match="permission denied; free space, change the perm"):
-        check_writable(tmp_path / "a.rrd")
+    with pytest.raises(RecordingError, match="Permission denied; free space, change the perm"):
+        check_writable(tmp_path / "a.rrd", RecordingError)
 
 
 def test_checking_leaves_an_existing_file_alone(tmp_path: Path) -> None:
@@ -401,7 +402,7 @@ def test_full_disk_leaves_the_old_file_and_nothing_else(
 
     recorder = Recorder(path, run(3)[0])
     monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(RecordingError, match="no space left on device; free space"), recorder:
+    with pytest.raises(RecordingError, match="No space left on device; free space"), recorder:
         pass
     assert path.read_bytes() == b"precious" and os.listdir(tmp_path) == ["a.rrd"]
 
@@ -417,7 +418,7 @@ def test_failed_write_does_not_hide_the_first_error(
     ):
         directory.rmdir()
         raise ZeroDivisionError
-    assert "does not exist" in caught.value.__notes__[0]
+    assert "no folder" in caught.value.__notes__[0]
 
 
 def test_disabled_rerun_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -519,8 +520,13 @@ def test_rollouts_of_other_bodies_are_refused(field: str, model: mujoco.MjModel)
 
 
 def test_experiment_checks_its_shapes() -> None:
-    with pytest.raises(InvalidInputError, match=r"w_expert must have shape \(3,\), got \(2,\)"):
-        Experiment("x", objectives(3), Expert(np.zeros(3), np.zeros(3)), w_expert=np.zeros(2))
+    with pytest.raises(InvalidInputError, match=r"truth.w must have shape \(3,\), got \(2,\)"):
+        Experiment(
+            "x",
+            objectives(3),
+            Expert(np.zeros(3), np.zeros(3)),
+            truth=Truth(np.zeros(2), np.zeros(3)),
+        )
 
 
 def test_hull_draws_outward_triangles_and_true_edges() -> None:

@@ -9,13 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from walking_irl.errors import InvalidInputError
-from walking_irl.experiments import gridworld, humanoid, lqr, walking_path
+from walking_irl.experiments import forward_methods, gridworld, humanoid, lqr, walking_path
 from walking_irl.experiments.runner import Progress, Runner
 from walking_irl.experiments.table import Table
 
 __all__ = ["TABLES", "run", "run_tables"]
 
 TABLES: dict[str, tuple[Callable[[Any, Runner], Table], Any]] = {
+    "2.1": (forward_methods.table_2_1, forward_methods.Config()),
     "7.1": (gridworld.table_7_1, gridworld.Config()),
     "fig7.1": (gridworld.figure_7_1, gridworld.Config()),
     "7.2": (gridworld.table_7_2, gridworld.Config()),

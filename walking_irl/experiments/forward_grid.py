@@ -159,7 +159,7 @@ SOLVERS: dict[str, Solver] = {
     "value iteration": partial(_from_model, value_iteration),
     "linear program": partial(_from_model, linear_program),
     "approximate value iteration, linear": partial(_fitted, _linear_fit, 10),
-    "approximate value iteration, nearest neighbours": partial(_fitted, _neighbours, 10),
+    "approximate value iteration, neighbours": partial(_fitted, _neighbours, 10),
     "LSPI": partial(_lspi, 10_000),
     "REINFORCE": partial(_gradient, reinforce, False),
     "GPOMDP": partial(_gradient, gpomdp, False),

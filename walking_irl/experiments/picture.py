@@ -1,4 +1,4 @@
-"""Pictures of tables, as SVG: solves by method, and steps against samples."""
+"""Pictures of tables, as SVG: solves or losses by method, and steps against samples."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ import math
 from collections.abc import Sequence
 from html import escape
 from itertools import groupby
+from typing import NamedTuple
 
-OURS, RIVAL, FAINT, INK = "#3b6fb6", "#9a9a9a", "#e2e2e2", "#222222"
-ROW, LABELS, PLOT, RESULT = 20, 250, 420, 90
+OURS, BASELINE, FAINT, INK = "#3b6fb6", "#9a9a9a", "#e2e2e2", "#222222"
+ROW, LABELS, PLOT, RESULT = 20, 270, 420, 90
 """Height of a row; widths of labels, of the plot and of the results beside it [px]."""
 
 
@@ -36,7 +37,7 @@ def solves_chart(title: str, rows: Sequence[Sequence[str]]) -> str:
         y += ROW + 2
         for _, method, mean, error, success in group:
             n, total = success.split("/")
-            colour = OURS if method.startswith("CPIRL") else RIVAL
+            colour = OURS if method.startswith("CPIRL") else BASELINE
             fill = colour if n == total else "white"
             middle = y + ROW / 2
             body.append(_text(LABELS - 8, middle + 4, method, anchor="end"))
@@ -89,6 +90,56 @@ def steps_chart(title: str, rows: Sequence[Sequence[str]]) -> str:
     body.append(_text(left + width / 2, top + height + 40, "samples of hit-and-run", "middle"))
     body.append(_text(8, top - 12, "steps, mean and standard deviation"))
     return _svg(title, left + width + 20, top + height + 52, body)
+
+
+class Loss(NamedTuple):
+    """One bar of a chart of losses."""
+
+    setting: str
+    method: str
+    value: float
+    low: float
+    """Ends of its error bar."""
+    high: float
+
+
+def loss_chart(title: str, bars: Sequence[Loss], caption: str) -> str:
+    """Bars of losses on a logarithmic axis from 1e-4 to 1, or as far as the largest goes.
+
+    Args:
+        title: Heading.
+        bars: From top to bottom; equal settings in a row stand under one heading.
+        caption: What value and error bar are.
+    """
+    least = 1e-4
+    most = max([1.0, *(bar.high for bar in bars)])
+    decades = math.log10(most / least)
+
+    def x(value: float) -> float:
+        return LABELS + PLOT * math.log10(max(value, least) / least) / decades
+
+    body, y = [], 50.0
+    for setting, group in groupby(bars, key=lambda bar: bar.setting):
+        body.append(_text(8, y + 14, setting, weight="bold"))
+        y += ROW + 2
+        for bar in group:
+            colour = OURS if bar.method.startswith("CPIRL") else BASELINE
+            middle = y + ROW / 2
+            body.append(_text(LABELS - 8, middle + 4, bar.method, anchor="end"))
+            body.append(
+                f'<rect x="{LABELS}" y="{y + 4:g}" width="{max(x(bar.value) - LABELS, 1.5):.1f}" '
+                f'height="{ROW - 8}" fill="{colour}" stroke="{colour}"/>'
+            )
+            body.append(_line(x(bar.low), middle, x(bar.high), middle, INK))
+            label = "0" if bar.value < 1e-12 else f"{bar.value:.2g}"
+            body.append(_text(max(x(bar.high), LABELS + 2) + 6, middle + 4, label))
+            y += ROW
+        y += 8
+    ticks = [10.0**k for k in range(-4, math.floor(math.log10(most)) + 1)]
+    axis = [_line(x(v), 44, x(v), y, FAINT) for v in ticks]
+    axis += [_text(x(v), 38, f"{v:g}", anchor="middle") for v in ticks]
+    body.append(_text(8, y + 14, caption, colour="#666666"))
+    return _svg(title, LABELS + PLOT + RESULT, y + 26, [*axis, *body])
 
 
 def _numbers(cell: str) -> tuple[float, float]:

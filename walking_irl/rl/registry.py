@@ -46,11 +46,11 @@ METHODS: dict[str, ForwardMethod] = {
         ),
         ForwardMethod(
             "approximate value iteration, linear", "approximate_value_iteration",
-            "Munos & Szepesvari 2008", "generative model", (FINITE,),
+            "Munos & Szepesvari 2008", "generative model", BOTH,
             "none: sweeps may diverge, which is reported",
         ),
         ForwardMethod(
-            "approximate value iteration, nearest neighbours", "approximate_value_iteration",
+            "approximate value iteration, neighbours", "approximate_value_iteration",
             "Gordon 1995", "generative model", (FINITE,),
             "converges; as good as its samples and neighbours",
         ),

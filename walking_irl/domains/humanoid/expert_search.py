@@ -15,8 +15,9 @@ import numpy as np
 
 from walking_irl.arrays import Array
 from walking_irl.domains.humanoid.gait.library import load_library
-from walking_irl.domains.humanoid.learner import NUDGE, check_weights, polish, run_tasks, solver_for
+from walking_irl.domains.humanoid.learner import NUDGE, check_weights, polish, solver_for
 from walking_irl.domains.humanoid.optimiser.solver import Solution, Stage, stage
+from walking_irl.workers import run_tasks
 
 SEARCH_PENALTY = 1e4
 CONTINUE = (stage(1e3, 60, 1e-5), stage(SEARCH_PENALTY, 100, 1e-6))

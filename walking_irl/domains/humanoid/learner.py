@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from walking_irl.arrays import Array
+from walking_irl.domains.contract import OnStep
 from walking_irl.domains.humanoid.body.anatomy import load_walker
 from walking_irl.domains.humanoid.costs.objectives import OBJECTIVES
 from walking_irl.domains.humanoid.gait.gait import Gait
@@ -23,8 +24,10 @@ from walking_irl.domains.humanoid.optimiser.solver import (
     Stage,
 )
 from walking_irl.domains.humanoid.optimiser.transcription import Transcription
-from walking_irl.errors import InvalidInputError, SolverError
+from walking_irl.domains.weights import normalised
+from walking_irl.errors import SolverError
 from walking_irl.types import Response
+from walking_irl.workers import run_tasks
 
 NUDGE = np.deg2rad(0.005)
 """Learners start this far from the demonstration, so as not to sit on its contact jump."""
@@ -45,14 +48,7 @@ def check_weights(w: Array) -> Array:
     Raises:
         InvalidInputError: If they have another shape, or are negative, not finite or all zero.
     """
-    w = np.asarray(w, dtype=float)
-    names = ", ".join(o.name for o in OBJECTIVES)
-    if w.shape != (len(OBJECTIVES),):
-        raise InvalidInputError(f"expected {len(OBJECTIVES)} weights ({names}), got {w.size}")
-    if not np.isfinite(w).all() or (w < 0).any() or not w.any():
-        raise InvalidInputError(f"weights must be finite, >= 0 and not all zero, got {w.tolist()}")
-    w = w / w.max()  # against overflow
-    return np.asarray(w / w.sum())
+    return normalised(w, OBJECTIVES)
 
 
 def polish(planar: bool, w: Array, x: Array, stages: Sequence[Stage]) -> Solution:
@@ -100,13 +96,6 @@ def search(
     return respond(solver_for(planar), w, solutions[0], solutions[1:])
 
 
-def run_tasks(function: Any, tasks: Sequence[tuple[Any, ...]], executor: Executor | None) -> Any:
-    """Results of ``function(*task)`` in order, side by side where there is an executor."""
-    if executor is None:
-        return [function(*task) for task in tasks]
-    return [f.result() for f in [executor.submit(function, *task) for task in tasks]]
-
-
 class Imitator:
     """The learner's forward solver: it sees a demonstrated gait and starts from there.
 
@@ -118,28 +107,35 @@ class Imitator:
         demonstration: Demonstrated gait.
         planar: Which body.
         threads: Threads of one solve.
+        on_step: Told of every iteration of a solve in this process, with its cost.
     """
 
-    def __init__(self, demonstration: Gait, planar: bool = False, threads: int = 1) -> None:
-        self.planar, self.threads = planar, threads
+    def __init__(
+        self,
+        demonstration: Gait,
+        planar: bool = False,
+        threads: int = 1,
+        on_step: OnStep | None = None,
+    ) -> None:
+        self.planar, self.threads, self.on_step = planar, threads, on_step
         self.start = demonstration.to_vector()
         solver = solver_for(planar, threads)
         self.demonstrated = solver.problem.evaluate(self.start).folded()
         self.archive: list[tuple[Array, Array]] = []
 
     def __getstate__(self) -> dict[str, Any]:
-        """One thread in another process: a pool already uses the cores."""
-        return {**self.__dict__, "threads": 1}
+        """One thread in another process, unseen: a pool already uses the cores."""
+        return {**self.__dict__, "threads": 1, "on_step": None}
 
     def __call__(self, w: Array) -> Response:
         """Best gait for weights ``w`` near the demonstration."""
         solver = solver_for(self.planar, self.threads)
         seed = [int(v) for v in np.round(np.asarray(w) * 1e9)]
         start = solver.shake(self.start, NUDGE, np.random.default_rng(seed))
-        solutions = [solver.solve(w, start, DIRECT)]
+        solutions = [solver.solve(w, start, DIRECT, self.on_step)]
         better = self._better_start(w, float(solutions[0].folded @ w))
         if better is not None:
-            solutions.append(solver.solve(w, better, DIRECT))
+            solutions.append(solver.solve(w, better, DIRECT, self.on_step))
         solutions.sort(key=lambda s: float(s.folded @ w))
         best = solutions[0]
         self.archive.append((best.x, best.folded))

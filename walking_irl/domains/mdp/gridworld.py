@@ -8,6 +8,7 @@ import numpy as np
 from scipy import sparse
 
 from walking_irl.arrays import Array, Indices
+from walking_irl.domains.contract import Option
 from walking_irl.domains.mdp.finite import FiniteDomain
 from walking_irl.domains.mdp.grid import grid_transitions
 from walking_irl.errors import InvalidInputError
@@ -20,6 +21,9 @@ SUCCESS = 0.7
 """Probability that an action is obeyed, else a uniformly random direction (Abbeel & Ng 2004)."""
 VARIANTS = ("patches", "macro")
 SIZES = (8, 64)
+OPTIONS = {
+    "population": Option("uniform", "how ground-truth weights are drawn", ("uniform", "sparse"))
+}
 
 
 class GridPicture(NamedTuple):
@@ -34,7 +38,7 @@ class GridPicture(NamedTuple):
 
 
 class Gridworld(FiniteDomain):
-    """A walk on size x size cells that collects the features of cells x cells regions.
+    """An agent on size x size cells that collects the features of cells x cells regions.
 
     In the "macro" variant the regions tile the grid, so that all features sum to a constant: the
     weights are then known only up to w -> a w + (1 - a)/K, and uniform weights explain every
@@ -49,6 +53,9 @@ class Gridworld(FiniteDomain):
         discount: gamma in [0, 1).
         method: Forward solver, see :class:`FiniteDomain`.
     """
+
+    options = OPTIONS
+    view = "gridworld"
 
     def __init__(
         self,
@@ -69,11 +76,14 @@ class Gridworld(FiniteDomain):
         name = "gridworld" if variant == "patches" else "gridworld-macro"
         super().__init__(name, _objectives(cells), mdp, method)
 
-    def random_weights(self, rng: np.random.Generator) -> Array:
-        """Sparse hidden weights: each non-zero with probability .3, at least two, uniform values.
+    def random_weights(self, population: str, rng: np.random.Generator) -> Array:
+        """Ground-truth weights, shape (K,).
 
-        Abbeel & Ng draw non-zeros with probability .1 for K = 64; .3 suits K = 9 and 16.
+        Sparse ones are non-zero with probability .3, at least two, with uniform values; Abbeel & Ng
+        draw non-zeros with probability .1 for K = 64, and .3 suits K = 9 and 16.
         """
+        if population != "sparse":
+            return super().random_weights(population, rng)
         share = 0.1 if self.cells >= 8 else 0.3
         while True:
             w = rng.random(self.cells**2) * (rng.random(self.cells**2) < share)

@@ -15,9 +15,9 @@ from walking_irl.domains.humanoid.closed_loop.policy import tracking_policy
 from walking_irl.domains.humanoid.closed_loop.rollout import rollout
 from walking_irl.domains.humanoid.costs.objectives import folded_costs
 from walking_irl.domains.humanoid.gait.gait import Gait
-from walking_irl.domains.humanoid.learner import run_tasks
 from walking_irl.errors import InvalidInputError
 from walking_irl.types import Rollout
+from walking_irl.workers import run_tasks
 
 DISTURBANCES = ("initial", "kicks")
 MANY = 100

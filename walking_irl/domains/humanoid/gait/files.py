@@ -8,9 +8,7 @@ from __future__ import annotations
 
 import csv
 import io
-import zlib
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -19,7 +17,7 @@ from walking_irl.arrays import Array
 from walking_irl.domains.humanoid.body.anatomy import Walker
 from walking_irl.domains.humanoid.gait.gait import Gait, whole_cycle
 from walking_irl.errors import InvalidInputError
-from walking_irl.files import write_file
+from walking_irl.files import UNREADABLE, write_arrays, write_file
 
 N_KNOTS = 40
 LEAST_STEP = 0.05  # [m]
@@ -40,9 +38,7 @@ def save_gait(path: Path, gait: Gait, walker: Walker) -> None:
     }
     _check_ending(path)
     if path.suffix == ".npz":
-        packed = io.BytesIO()
-        np.savez_compressed(packed, **columns)
-        write_file(path, packed.getvalue())
+        write_arrays(path, columns)
     else:
         text = io.StringIO(newline="")
         writer = csv.writer(text)
@@ -112,21 +108,6 @@ def _resample(q: Array, n: int, stride: float | None = None) -> Array:
     steady = np.vstack([q - np.outer(phase[:-1], drift), q[:1]])
     at = np.arange(n) / n
     return np.asarray(CubicSpline(phase, steady, bc_type="periodic")(at) + np.outer(at, drift))
-
-
-UNREADABLE = (
-    OSError,
-    ValueError,
-    EOFError,
-    TypeError,
-    AttributeError,
-    KeyError,
-    NotImplementedError,
-    BadZipFile,
-    csv.Error,
-    zlib.error,
-)
-"""What NumPy and csv raise on files that they cannot read; an .npy named .npz is one of them."""
 
 
 def _check_ending(path: Path) -> None:

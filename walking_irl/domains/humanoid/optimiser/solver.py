@@ -98,22 +98,27 @@ class GaitSolver:
 
     Attributes:
         problem: The transcription.
-        watch: Called after every iteration with its number and the cost, or None.
     """
 
     def __init__(self, problem: Transcription) -> None:
         self.problem = problem
-        self.watch: Callable[[int, float], None] | None = None
         windows = Windows(problem.n_knots, problem.walker.mirror)
         self.fold = Fold(problem.n_knots, problem.nv, windows)
 
-    def solve(self, w: Array, x: Array, stages: Sequence[Stage] = DIRECT) -> Solution:
+    def solve(
+        self,
+        w: Array,
+        x: Array,
+        stages: Sequence[Stage] = DIRECT,
+        on_step: Callable[[int, float], None] | None = None,
+    ) -> Solution:
         """Best gait for weights ``w`` near the gait ``x``.
 
         Args:
             w: Weights, shape (6,).
             x: Start, shape (N nv + 2,).
             stages: Homotopy in the root penalty, easiest first.
+            on_step: Told of every iteration: its number and the cost.
 
         Raises:
             SolverError: If the cost of the start is not finite.
@@ -123,7 +128,7 @@ class GaitSolver:
         iterations = 0
         stalled = False
         for s in stages:
-            run = _Descent(self, w, s, anchor)
+            run = _Descent(self, w, s, anchor, on_step)
             x, n, stalled = run.minimise(x, passed)
             iterations += n
         ev = self.problem.evaluate(x)
@@ -188,8 +193,16 @@ def _harmonics(c: Array, phase: Array) -> Array:
 class _Descent:
     """State of one stage."""
 
-    def __init__(self, solver: GaitSolver, w: Array, s: Stage, anchor: Array) -> None:
+    def __init__(
+        self,
+        solver: GaitSolver,
+        w: Array,
+        s: Stage,
+        anchor: Array,
+        on_step: Callable[[int, float], None] | None,
+    ) -> None:
         self.solver, self.problem, self.w, self.stage = solver, solver.problem, w, s
+        self.on_step = on_step
         self.anchor = anchor
         self.tether = np.full(anchor.size, s.tether)
         self.tether[-2:] *= anchor.size  # L and T concern all knots
@@ -213,8 +226,8 @@ class _Descent:
         iteration = 0
         for iteration in range(1, self.stage.max_iter + 1):  # noqa: B007
             found, decrease, is_step = self.step(at)
-            if self.solver.watch is not None:
-                self.solver.watch(iteration, 2 * found.cost)
+            if self.on_step is not None:
+                self.on_step(iteration, 2 * found.cost)
             if is_step:
                 passed.append(found.ev.folded())
                 self.failures = 0

@@ -8,24 +8,28 @@ import numpy as np
 import pytest
 from problems import without_sensitivity
 
-from walking_irl.baselines import max_margin, mwal, projection
+from walking_irl.baselines import Setting, max_margin, mwal, projection
 from walking_irl.cpirl.loop import cpirl
 from walking_irl.domains.lqr import LQR
 from walking_irl.domains.mdp.gridworld import Gridworld
-from walking_irl.experiments import gridworld, lqr, runner, tasks
+from walking_irl.experiments import contenders, rows, runner, tasks
 from walking_irl.experiments.cutting import cutting_planes
 from walking_irl.experiments.runner import Runner
-from walking_irl.experiments.tasks import Task, hidden_expert, run_task
+from walking_irl.experiments.tasks import Task, run_task, synthetic_expert
 from walking_irl.geometry.game import game_lp
+from walking_irl.run import stopwatch
 
 OPTIMAL = Task("lqr", {"n_objectives": 3}, share=0.002, arguments={"centre": "ac"})
 POOR = replace(OPTIMAL, options={"n_objectives": 3, "perturbation": 0.25}, criterion="dominance")
 
 
+ONE_SIDED = Setting(is_signed=False)
+
+
 def the_expert(task):
     rng = np.random.default_rng([task.seed, 7])
     domain = LQR(**task.options)
-    w_E, expert, _ = hidden_expert(task, domain, rng)
+    w_E, expert, _ = synthetic_expert(task, domain, rng)
     return domain, w_E, expert, rng
 
 
@@ -58,12 +62,12 @@ def test_a_dominating_mixture_comes_no_later_than_a_dominating_policy(seed):
 @pytest.mark.parametrize(
     ("name", "method"), [("projection", projection), ("max-margin", max_margin)]
 )
-def test_rivals_are_scored_as_mixture_and_as_last_policy(name, method):
+def test_baselines_are_scored_as_mixture_and_as_last_policy(name, method):
     differ = 0
     for seed in range(4):
         task = replace(POOR, method=name, arguments={}, seed=seed, max_solves=25)
         domain, _, expert, rng = the_expert(task)
-        run = list(method(domain.forward, expert, rng=rng, max_solves=25, is_signed=False))
+        run = list(method(domain.forward, expert, rng=rng, max_solves=25, setting=ONE_SIDED))
         for scored in ("mixture", "last"):
             mus = [a.mu if scored == "mixture" else a.last.mu for a in run]
             good = [bool((mu - expert.mu).min() >= -1e-9 * np.abs(expert.mu).max()) for mu in mus]
@@ -78,14 +82,14 @@ def test_algorithm_3_rows_run_the_utopia():
     for seed in range(4):
         task = replace(POOR, method="utopia", seed=seed, least_advantage=0.002, max_solves=60)
         domain, _, expert, rng = the_expert(task)
-        rule = tasks.centre_rule("ac")
+        rule = contenders.centre_rule("ac")
         run = list(
             cutting_planes(domain.forward, expert, rule, rng=rng, max_solves=60, has_utopia=True)
         )
         good = [bool((s.response.mu - expert.mu).min() >= 0) for s in run]
         outcome = run_task(task)
         assert outcome["solves"] == (first(good) if any(good) else len(run))
-    labels = {row.method: row.task for row in lqr.dominance_rows("n=3", POOR)}
+    labels = {row.method: row.task for row in rows.dominance_rows("n=3", POOR)}
     for centre in ("ac", "cg", "mvie", "cc"):
         row = labels[f"CPIRL-{centre.upper()} Algorithm 3"]
         assert (row.method, row.arguments["centre"]) == ("utopia", centre)
@@ -95,23 +99,25 @@ def test_algorithm_3_rows_run_the_utopia():
     assert newton.arguments["has_newton"] and newton.scored == "last"
 
 
-def test_rivals_rows_run_what_their_labels_say():
-    rows = {r.method: r.task for r in gridworld.rivals("x", OPTIMAL, (20, 200), is_finite=True)}
+def test_baseline_rows_run_what_their_labels_say():
+    made = rows.baseline_rows("x", OPTIMAL, (20, 200), is_finite=True)
+    found = {r.method: r.task for r in made}
     for T in (20, 200):
         for scored in ("mixture", "last"):
-            task = rows[f"MWAL T={T}, {scored}"]
+            task = found[f"MWAL T={T}, {scored}"]
             assert (task.method, task.max_solves, task.scored) == ("mwal", T, scored)
     for method, label in (("projection", "Projection"), ("max-margin", "Max-margin")):
         for scored in ("mixture", "last"):
-            task = rows[f"{label}, {scored}"]
+            task = found[f"{label}, {scored}"]
             assert (task.method, task.max_solves, task.scored) == (method, 60, scored)
-    assert rows["LPAL (one program)"].method == "lpal"
-    assert gridworld.rivals("x", OPTIMAL, (20,), is_finite=False)[-1].task is None
+    assert found["LPAL (one program)"].method == "lpal"
+    assert rows.baseline_rows("x", OPTIMAL, (20,), is_finite=False)[-1].task is None
 
 
 def test_seconds_of_the_solver_are_not_the_methods(monkeypatch):
     clock = [0.0]
-    monkeypatch.setattr(tasks, "time", SimpleNamespace(perf_counter=lambda: clock[0]))
+    for module in (tasks, stopwatch):
+        monkeypatch.setattr(module, "time", SimpleNamespace(perf_counter=lambda: clock[0]))
     forward = LQR.forward
 
     def slow(self, w):
@@ -129,33 +135,34 @@ def test_figure_samples_as_often_as_it_says(monkeypatch, n):
 
     def gravity(P, *, rng, n_samples):
         asked.append(n_samples)
-        return tasks.centre_rule("ac")(P, rng=rng)
+        return contenders.centre_rule("ac")(P, rng=rng)
 
-    monkeypatch.setattr(tasks, "gravity", gravity)
+    monkeypatch.setattr(contenders, "gravity", gravity)
     run_task(replace(OPTIMAL, method="samples", arguments={"n_samples": n}))
     assert set(asked) == {n}
 
 
-def test_rivals_get_the_weights_and_the_span_that_their_world_allows(monkeypatch):
+def test_baselines_get_the_weights_and_the_span_that_their_world_allows(monkeypatch):
     given = {}
 
     def spy(name, method, *args, **settings):
         given[name] = settings
         return method(*args, **settings)
 
-    monkeypatch.setattr(tasks, "projection", partial(spy, "projection", projection))
-    monkeypatch.setattr(tasks, "mwal", partial(spy, "mwal", mwal))
+    for name, method in (("projection", projection), ("mwal", mwal)):
+        spied = partial(contenders._baseline, method=partial(spy, name, method))
+        monkeypatch.setitem(contenders.METHODS, name, spied)
     grid = Task("gridworld", {"size": 9, "cells": 3}, max_solves=5)
     for task, is_signed in ((grid, True), (replace(OPTIMAL, arguments={}), False)):
         run_task(replace(task, method="projection"))
-        assert given["projection"]["is_signed"] is is_signed
+        assert given["projection"]["setting"].is_signed is is_signed
     run_task(replace(grid, method="mwal"))
-    assert given["mwal"]["span"] == pytest.approx(1 / (1 - Gridworld(9, 3).mdp.discount))
+    assert given["mwal"]["setting"].span == pytest.approx(1 / (1 - Gridworld(9, 3).mdp.discount))
     assert given["mwal"]["max_solves"] == 5
     run_task(replace(OPTIMAL, method="mwal", arguments={}))
     domain, _, expert, _ = the_expert(OPTIMAL)
     largest = max(np.abs(domain.forward(e).mu - expert.mu).max() for e in np.eye(3))
-    assert given["mwal"]["span"] == pytest.approx(largest)
+    assert given["mwal"]["setting"].span == pytest.approx(largest)
 
 
 def test_a_program_makes_no_forward_solve():

@@ -1,0 +1,136 @@
+"""The methods of the tables, one forward solve a state: CPIRL in all its forms, the baselines."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from walking_irl.arrays import Array
+from walking_irl.baselines import BASELINES, lpal
+from walking_irl.baselines.loop import Baseline, Setting
+from walking_irl.cpirl.loop import cpirl
+from walking_irl.errors import InvalidInputError
+from walking_irl.experiments.cutting import cutting_planes
+from walking_irl.geometry.centres import centre_rule
+from walking_irl.geometry.centres.gravity import gravity
+from walking_irl.geometry.game import game_lp
+from walking_irl.types import Expert, Forward
+
+if TYPE_CHECKING:
+    from walking_irl.experiments.tasks import Task
+
+
+class Contest(NamedTuple):
+    """What a method is given."""
+
+    forward: Forward
+    """The learner's solver."""
+    oracle: Forward
+    """The same for baselines, whose queries are moved off the faces where that is needed."""
+    expert: Expert
+    setting: Setting
+    min_weight: float
+    """CPIRL's lower bound of every weight."""
+    rng: np.random.Generator
+
+
+class State(NamedTuple):
+    """What a method holds after a forward solve."""
+
+    mu: Array
+    """Of the policy or mixture that is scored."""
+    M: Array
+    """Of all policies found."""
+    w: Array | None
+    """Estimate of the weights, where the method has one."""
+    width: float | None
+    """Largest weight interval, where the method has intervals."""
+
+
+def states(task: Task, contest: Contest) -> Iterator[State]:
+    """The states of a task's method, one per forward solve.
+
+    Raises:
+        InvalidInputError: If there is no such method.
+    """
+    if task.method not in METHODS:
+        choices = ", ".join(METHODS)
+        raise InvalidInputError(f"unknown method {task.method!r}; choose from {choices}")
+    return METHODS[task.method](task, contest)
+
+
+def _cpirl(task: Task, contest: Contest) -> Iterator[State]:
+    M: list[Array] = []
+    run = cpirl(
+        contest.forward,
+        contest.expert,
+        centre=task.arguments["centre"],
+        mode="optimal" if task.criterion == "return" else "minimise",
+        max_solves=task.max_solves,
+        min_weight=contest.min_weight,
+        rng=contest.rng,
+    )
+    for it in run:
+        M.append(it.response.mu)
+        mu = it.response.mu
+        if task.scored == "mixture":
+            mu = _best_mixture(np.array(M), contest.expert.mu)
+        width = float(np.ptp(it.intervals, axis=1).max())
+        yield State(mu, np.array(M), it.estimate, width)
+
+
+def _best_mixture(M: Array, mu_E: Array) -> Array:
+    """mu of the mixture with the smallest worst-case loss."""  # noqa: D403
+    mixture = np.maximum(game_lp(M - mu_E).mixture, 0.0)
+    mu: Array = mixture @ M / mixture.sum()
+    return mu
+
+
+def _cutting(task: Task, contest: Contest, has_utopia: bool) -> Iterator[State]:
+    if has_utopia:
+        rule = centre_rule(task.arguments["centre"])
+    else:
+        rule = partial(gravity, n_samples=task.arguments["n_samples"])
+    M: list[Array] = []
+    for step in cutting_planes(
+        contest.forward,
+        contest.expert,
+        rule,
+        rng=contest.rng,
+        max_solves=task.max_solves,
+        has_utopia=has_utopia,
+    ):
+        M.append(step.response.mu)
+        yield State(step.response.mu, np.array(M), step.w, None)
+
+
+def _baseline(
+    task: Task, contest: Contest, method: Baseline, has_queries: bool = True
+) -> Iterator[State]:
+    run = method(
+        contest.oracle,
+        contest.expert,
+        rng=contest.rng,
+        setting=contest.setting,
+        max_solves=task.max_solves,
+    )
+    for found in run:
+        mu = found.mu if task.scored == "mixture" else found.last.mu
+        w = found.W[-1]
+        is_estimate = has_queries and w.min() >= 0  # signed weights are none
+        yield State(mu, found.M, w if is_estimate else None, None)
+
+
+METHODS: dict[str, Callable[[Task, Contest], Iterator[State]]] = {
+    "cpirl": _cpirl,
+    "utopia": partial(_cutting, has_utopia=True),
+    "samples": partial(_cutting, has_utopia=False),
+    **{
+        name: partial(_baseline, method=method, has_queries=method is not lpal)
+        for name, method in BASELINES.items()
+    },
+}
+"""All of them by name."""
