@@ -59,7 +59,6 @@ def test_boltzmann_experts_are_recovered_in_a_few_solves(step, solves):
     for seed in range(3):
         mdp, w_E, policy, visits, _ = boltzmann_expert(seed)
         found = match_policy(mdp, policy, visits, step=step)
-        # rewards are known up to a constant only if the features span one; here they do not
         np.testing.assert_allclose(found.w, w_E, atol=1e-6)
         assert found.info["solves"] <= solves + 1
         assert found.status is Status.CONVERGED
