@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from walking_irl.arrays import Array
-from walking_irl.baselines.apprentice import Apprentice
 from walking_irl.baselines.cpirl_actions import cpirl_actions
 from walking_irl.baselines.gpirl import gpirl
+from walking_irl.baselines.loop import Baseline, Setting
 from walking_irl.baselines.lpal import lpal
 from walking_irl.baselines.max_margin import max_margin
 from walking_irl.baselines.maxent import maxent
@@ -50,10 +51,22 @@ def _answer(found: Recovered) -> Answer:
     return Answer(found.policy, found.reward, found.info.get("solves"))
 
 
-def _mixture(case: Case, run: Iterator[Apprentice] | list[Apprentice]) -> Answer:
+def _mixture(baseline: Baseline, case: Case, rng: np.random.Generator) -> Answer:
     """The lottery over all policies found, as one stationary policy."""
+    is_simplex = baseline in (mwal, lpal)  # they know weights >= 0 only
+    world = doubled(case.own_start) if is_simplex else case.own_start
+    span = 2 * float(np.abs(world.Phi).max()) / (1 - world.discount)
+    run = baseline(
+        forward(world),
+        case.expert(world),
+        rng=rng,
+        setting=Setting(span=span, mdp=world),
+        tol=1e-4,
+        max_solves=100 if baseline is mwal else 40,
+    )
     last = list(run)[-1]
-    world = case.own_start
+    if baseline is lpal:
+        return Answer(last.last.policy, None, 0)
     return Answer(last.stationary_policy(world)[0], None, len(last.responses))
 
 
@@ -66,24 +79,6 @@ def _ng_russell_3(case: Case, rng: np.random.Generator) -> Answer:
     world = case.own_start
     last = list(ng_russell_3(forward(world), case.expert(), rng=rng))[-1]
     return _weights(world, last.W[-1], len(last.responses))
-
-
-def _mwal(case: Case, rng: np.random.Generator) -> Answer:
-    world = doubled(case.own_start)
-    span = 2 * float(np.abs(world.Phi).max()) / (1 - world.discount)
-    run = mwal(forward(world), case.expert(world), span=span, max_solves=100)
-    return _mixture(case, run)
-
-
-class _Problem(NamedTuple):
-    """What LPAL asks of a domain."""
-
-    mdp: FiniteMDP
-
-
-def _lpal(case: Case, rng: np.random.Generator) -> Answer:
-    world = doubled(case.own_start)
-    return Answer(lpal(_Problem(world), case.expert(world)).last.policy, None, 0)
 
 
 def _cpirl(case: Case, rng: np.random.Generator) -> Answer:
@@ -127,14 +122,10 @@ SETUPS: dict[str, Setup] = {
     "GPIRL": lambda case, rng: _answer(
         gpirl(case.mdp, case.demonstrations, rng=rng, features=case.raw)
     ),
-    "projection": lambda case, rng: _mixture(
-        case, projection(forward(case.own_start), case.expert(), rng=rng, tol=1e-4, max_solves=40)
-    ),
-    "max-margin": lambda case, rng: _mixture(
-        case, max_margin(forward(case.own_start), case.expert(), rng=rng, tol=1e-4, max_solves=40)
-    ),
-    "MWAL": _mwal,
-    "LPAL": _lpal,
+    "projection": partial(_mixture, projection),
+    "max-margin": partial(_mixture, max_margin),
+    "MWAL": partial(_mixture, mwal),
+    "LPAL": partial(_mixture, lpal),
     "CPIRL": _cpirl,
     "CPIRL from actions": lambda case, rng: _answer(
         cpirl_actions(case.mdp, case.demonstrations, rng=rng)
