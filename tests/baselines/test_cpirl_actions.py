@@ -15,7 +15,7 @@ from walking_irl.types import Expert, Response, Status
 def seen(seed, n=5, H=20):
     domain = RandomMDP(seed=seed)
     rng = np.random.default_rng(seed)
-    w = domain.random_weights(rng)
+    w = rng.dirichlet(np.ones(5))
     pi = best_policy(domain.mdp, domain.mdp.reward(w)).pi
     return domain.mdp, demonstrate(domain.mdp, pi, n, H, rng=rng), w, pi, rng
 

@@ -3,6 +3,7 @@ import numpy as np
 import pytest
 from small_mdps import random_mdp
 
+from walking_irl.baselines.loop import Setting
 from walking_irl.baselines.ng_russell_1 import critical_penalty, ng_russell_1
 from walking_irl.baselines.ng_russell_2 import advantage_rows, margin_program, ng_russell_2
 from walking_irl.baselines.ng_russell_3 import ng_russell_3
@@ -162,7 +163,9 @@ def test_from_trajectories_ends_and_says_why(is_simplex):
         mdp, pi, _, rng = optimal(seed)
         mu_E = mdp.feature_expectations(pi)
         expert = type("Known", (), {"mu": mu_E})()
-        *_, last = ng_russell_3(finite_forward(mdp), expert, rng=rng, is_simplex=is_simplex)
+        *_, last = ng_russell_3(
+            finite_forward(mdp), expert, rng=rng, setting=Setting(not is_simplex)
+        )
         assert last.status in (Status.STALLED, Status.MATCHED)
         assert len(last.W) <= 40 and last.mixture.sum() == pytest.approx(1.0)
         low = 0.0 if is_simplex else -1.0

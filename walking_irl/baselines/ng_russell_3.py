@@ -13,11 +13,12 @@ import numpy as np
 
 from walking_irl.arrays import Array
 from walking_irl.baselines.apprentice import Apprentice, closest_mixture
-from walking_irl.baselines.ng_russell_2 import PENALTY, margin_program
-from walking_irl.baselines.recovered import not_negative, positive
-from walking_irl.types import Expert, Forward, Response, Status
+from walking_irl.baselines.loop import USUAL, Move, Setting, apprentices
+from walking_irl.baselines.ng_russell_2 import margin_program
+from walking_irl.types import Expert, Forward, Status
 
 REPEATED = 1e-9
+"""Largest difference of weights that count as asked for before."""
 
 
 def ng_russell_3(
@@ -25,46 +26,29 @@ def ng_russell_3(
     expert: Expert,
     *,
     rng: np.random.Generator,
-    penalty: float = PENALTY,
+    setting: Setting = USUAL,
     tol: float = 1e-9,
     max_solves: int = 40,
-    is_simplex: bool = False,
 ) -> Iterator[Apprentice]:
     """Ask for the weights under which the expert beats all policies found by most.
 
-    Args:
-        forward: Best policy for weights; must take negative ones unless ``is_simplex``.
-        expert: The expert; only ``mu`` is used.
-        rng: Draws the first weights.
-        penalty: How much harder a policy counts that beats the expert.
-        tol: Value of the program that counts as none, relative to max |mu_E|.
-        max_solves: Budget of forward solves.
-        is_simplex: Whether w >= 0 and sum w = 1; else |w_j| <= 1.
-
-    Yields:
-        One apprentice per forward solve; the last has a status other than CUT: MATCHED (no
-        weights tell the expert from the policies), STALLED (weights repeat) or BUDGET.
+    |w_j| <= 1, or w on the simplex without ``setting.is_signed``; the first weights are drawn. The
+    last status is MATCHED (the program's value is at most ``tol`` max |mu_E|: no weights tell the
+    expert from the policies), STALLED (weights repeat) or BUDGET. Arguments: see
+    :class:`~.loop.Baseline`.
     """
-    positive(max_solves=max_solves)
-    not_negative(tol=tol)
     K, scale = len(expert.mu), max(float(np.abs(expert.mu).max()), 1e-300)
-    w = rng.dirichlet(np.ones(K)) if is_simplex else rng.uniform(-1, 1, K)
-    W: list[Array] = []
-    responses: list[Response] = []
-    status = Status.CUT
-    while status is Status.CUT:
-        W.append(w)
-        responses.append(forward(w))
-        M = np.array([r.mu for r in responses])
-        n = len(M)
-        w, value = margin_program(
-            expert.mu - M, np.arange(n), penalty=penalty, is_simplex=is_simplex
-        )
+    is_signed = setting.is_signed
+
+    def rule(W: Array, M: Array) -> Move:
+        rows = np.arange(len(M))
+        w, value = margin_program(expert.mu - M, rows, is_simplex=not is_signed)
+        status = Status.CUT
         if value <= tol * scale:
             status = Status.MATCHED
-        elif any(np.abs(w - v).max() <= REPEATED for v in W):
+        elif np.abs(W - w).max(axis=1).min() <= REPEATED:
             status = Status.STALLED
-        elif n == max_solves:
-            status = Status.BUDGET
-        mixture = closest_mixture(M, expert.mu, is_signed=not is_simplex)
-        yield Apprentice(np.array(W), tuple(responses), mixture, expert.mu, status)
+        return Move(closest_mixture(M, expert.mu, is_signed=is_signed), w, status)
+
+    first = rng.uniform(-1, 1, K) if is_signed else rng.dirichlet(np.ones(K))
+    return apprentices(forward, expert, first, rule, tol=tol, max_solves=max_solves)
