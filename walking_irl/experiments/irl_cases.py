@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from walking_irl.arrays import Array
-from walking_irl.baselines.recovered import from_start
 from walking_irl.domains.mdp.gridworld import Gridworld
 from walking_irl.domains.mdp.objectworld import Objectworld
 from walking_irl.domains.mdp.random_mdp import RandomMDP
 from walking_irl.domains.mdp.soft_expert import SCALE
-from walking_irl.rl.chain import Chain
 from walking_irl.rl.demonstrations import Demonstrations, demonstrate
 from walking_irl.rl.finite_mdp import Actions, FiniteMDP
 from walking_irl.rl.soft import soft_policy
 from walking_irl.rl.tabular import best_policy
-from walking_irl.types import Expert, Response
 
 
 @dataclass(frozen=True)
@@ -40,33 +37,6 @@ class Case:
     policy: Array | Actions
     demonstrations: Demonstrations
     is_nonnegative: bool
-
-    @property
-    def own_start(self) -> FiniteMDP:
-        """The world entered as the demonstrations enter it."""
-        return from_start(self.mdp, self.demonstrations)
-
-    def expert(self, mdp: FiniteMDP | None = None) -> Expert:
-        """Feature expectations of the demonstrations with error bars, of the world's features."""
-        mdp = self.mdp if mdp is None else mdp
-        return self.demonstrations.expert(mdp.Phi, mdp.discount)
-
-
-def forward(mdp: FiniteMDP) -> Callable[[Array], Response]:
-    """Best policy of any weights, each solve begun from the last one's policy."""
-    pi: Actions | None = None
-
-    def solve(w: Array) -> Response:
-        nonlocal pi
-        pi = best_policy(mdp, mdp.reward(w), pi=pi).pi
-        return Response(pi, mdp.Phi.T @ Chain(mdp, pi).solve_transposed(mdp.start))
-
-    return solve
-
-
-def doubled(mdp: FiniteMDP) -> FiniteMDP:
-    """The world with every feature and its negative: weights >= 0 then say any signed ones."""
-    return replace(mdp, Phi=np.hstack([mdp.Phi, -mdp.Phi]))
 
 
 def random_mdp(is_soft: bool, n: int, seed: int) -> Case:
