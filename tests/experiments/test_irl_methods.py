@@ -9,6 +9,7 @@ from walking_irl.experiments import GROUPS, TABLES, irl_methods, run, run_tables
 from walking_irl.experiments.irl_cases import CASES
 from walking_irl.experiments.irl_methods import Config, MethodJob, Setting
 from walking_irl.experiments.irl_setups import LINES
+from walking_irl.experiments.reward_maps import picture, reward_maps, shades
 from walking_irl.rl.tabular import loss
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -93,3 +94,18 @@ def test_a_group_of_tables_stands_for_its_parts(tmp_path, monkeypatch):
     monkeypatch.setitem(GROUPS, "3.1", ("3.1a", "3.1b"))
     names = [path.stem for path in run_tables(["3.1"], seeds=1, out=tmp_path)]
     assert set(names) == {"table_3_1a", "table_3_1b"}
+
+
+def test_reward_maps_begin_with_the_truth_and_leave_out_methods_of_complete_policies():
+    maps = reward_maps(5, 1, ("the expert itself", "ng-russell-1", "mce-likelihood", "lpal"))
+    assert [(m.label, m.is_reward) for m in maps] == [
+        ("truth", True),
+        ("mce-likelihood", True),
+        ("lpal", False),
+    ]
+    tree = ElementTree.fromstring(picture(maps, 5))
+    words = [t.text for t in tree.iter(f"{SVG}text")]
+    assert {m.label for m in maps} <= set(words)
+    cells = [path.get("d").count("M") for path in tree.iter(f"{SVG}path")]
+    assert sum(cells) == 3 * 256
+    assert set(shades(maps[0].values, 16).ravel()) <= set(range(24))

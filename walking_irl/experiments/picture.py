@@ -6,7 +6,10 @@ import math
 from collections.abc import Sequence
 from html import escape
 from itertools import groupby
+from textwrap import wrap
 from typing import NamedTuple
+
+from walking_irl.arrays import Array
 
 OURS, BASELINE, FAINT, INK = "#3b6fb6", "#9a9a9a", "#e2e2e2", "#222222"
 ROW, LABELS, PLOT, RESULT = 20, 270, 420, 90
@@ -166,6 +169,51 @@ def marks_chart(
     bottom = top + ROW * (len(rows) + 2)
     body.append(_text(8, bottom, caption, colour="#666666"))
     return _svg(title, LABELS + width * len(columns) + 20, bottom + 12, body)
+
+
+def maps_chart(
+    title: str, tiles: Sequence[tuple[str, str, Array, bool]], levels: int, caption: str
+) -> str:
+    """Square maps side by side, five in a row, one path for each shade of a map.
+
+    Args:
+        title: Heading.
+        tiles: Name, figure below it, shades from 0 to levels - 1 of shape (n, n), and whether the
+            map is in our colour or grey.
+        levels: Number of shades.
+        caption: What the shades mean.
+    """
+    side, across, pitch = 112.0, 5, (136.0, 166.0)
+    body = []
+    for i, (name, figure, shades, is_ours) in enumerate(tiles):
+        x, y = 12 + (i % across) * pitch[0], 66 + (i // across) * pitch[1]
+        cell = side / len(shades)
+        body.append(_text(x, y - 18, name, weight="bold"))
+        body.append(_text(x, y - 5, figure, colour="#666666"))
+        for level in sorted({int(v) for v in shades.ravel()}):
+            share = level / max(levels - 1, 1)
+            cells = "".join(
+                f"M{c * cell:g} {r * cell:g}h{cell:g}v{cell:g}h-{cell:g}z"
+                for r, c in zip(*(shades == level).nonzero(), strict=True)
+            )
+            fill = _shade(OURS if is_ours else BASELINE, share)
+            body.append(f'<path transform="translate({x:g} {y:g})" d="{cells}" fill="{fill}"/>')
+        body.append(
+            f'<rect x="{x:g}" y="{y:g}" width="{side:g}" height="{side:g}" fill="none" '
+            f'stroke="{BASELINE}"/>'
+        )
+    rows = -(-len(tiles) // across)
+    bottom = 66 + rows * pitch[1]
+    lines = wrap(caption, 105)
+    body += [_text(12, bottom + 14 * i, line, colour="#666666") for i, line in enumerate(lines)]
+    return _svg(title, 12 + across * pitch[0], bottom + 14 * len(lines), body)
+
+
+def _shade(colour: str, share: float) -> str:
+    """From white (0) to a dark form of the colour (1), as #rrggbb."""
+    rgb = [int(colour[i : i + 2], 16) for i in (1, 3, 5)]
+    mixed = [round(255 + (0.7 * c - 255) * share) for c in rgb]
+    return "#" + "".join(f"{c:02x}" for c in mixed)
 
 
 def _numbers(cell: str) -> tuple[float, float]:
