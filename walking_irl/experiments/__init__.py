@@ -13,6 +13,7 @@ from walking_irl.experiments import (
     forward_methods,
     gridworld,
     humanoid,
+    irl_continuous,
     irl_methods,
     lqr,
     walking_path,
@@ -26,6 +27,7 @@ TABLES: dict[str, tuple[Callable[[Any, Runner], Table], Any]] = {
     "2.1": (forward_methods.table_2_1, forward_methods.Config()),
     "3.1a": (irl_methods.table_3_1a, irl_methods.Listing()),
     "3.1b": (irl_methods.table_3_1b, irl_methods.Config()),
+    "3.1c": (irl_continuous.table_3_1c, irl_continuous.Config()),
     "7.1": (gridworld.table_7_1, gridworld.Config()),
     "fig7.1": (gridworld.figure_7_1, gridworld.Config()),
     "7.2": (gridworld.table_7_2, gridworld.Config()),
@@ -41,7 +43,7 @@ TABLES: dict[str, tuple[Callable[[Any, Runner], Table], Any]] = {
     "7.12": (humanoid.table_7_12, humanoid.Config()),
 }
 """What makes each table, and its default settings."""
-GROUPS = {"3.1": ("3.1a", "3.1b")}
+GROUPS = {"3.1": ("3.1a", "3.1b", "3.1c")}
 """Names that stand for several tables."""
 
 

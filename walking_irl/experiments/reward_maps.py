@@ -71,7 +71,7 @@ def shades(values: Array, size: int) -> Array:
     """Whole numbers from 0 (least) to LEVELS - 1 (largest), shape (size, size)."""
     low, span = values.min(), np.ptp(values)
     share = (values - low) / span if span > 0 else np.zeros_like(values)
-    return np.minimum((share * LEVELS).astype(int), LEVELS - 1).reshape(size, size)
+    return np.asarray(np.minimum((share * LEVELS).astype(int), LEVELS - 1).reshape(size, size))
 
 
 def picture(maps: Sequence[RewardMap], n: int) -> str:
