@@ -41,6 +41,5 @@ def test_the_error_of_sampled_controls_is_of_the_order_of_their_distance():
     assert near <= far / 3
 
 
-@pytest.mark.slow
 def test_girl_is_exact_on_walking_paths():
     assert ContinuousJob("walking path", "girl, exact gradients", 0).run()["dw"] <= 1e-9
