@@ -2,6 +2,13 @@
 
 import pytest
 
+from walking_irl.domains.humanoid.closed_loop.trials import DISTURBANCES, Protocol
+from walking_irl.domains.humanoid.domain import protocol_of
+from walking_irl.domains.humanoid.options import OPTIONS
+from walking_irl.domains.humanoid.population import POPULATIONS
+from walking_irl.geometry.centres import CENTRES
+from walking_irl.run.setup import Setup
+
 PLANAR = ("--domain", "humanoid-planar")
 WRONG_WEIGHTS = {
     "too few": "1,2,3",
@@ -90,3 +97,44 @@ def test_settings_of_recorded_walkers_are_refused_elsewhere(complaint):
     for option, value in (("--rollouts", 5), ("--noise", "nan"), ("--population", "uniform")):
         sentence = complaint("recover", "--domain", "lqr", option, value, "--no-record")
         assert option[2:] in sentence and "known exactly" in sentence
+
+
+@pytest.mark.parametrize(
+    ("argv", "refused"),
+    [
+        (("--expert", "suboptimal", "--rollouts", 3), "rollouts"),
+        (("--rollouts", 0, "--noise", 0.1), "noise"),
+        (("--rollouts", 0, "--disturbance", "kicks"), "disturbance"),
+        (("--weights", "1,1,1,1,1,1", "--population", "uniform"), "population"),
+    ],
+)
+def test_options_without_effect_are_refused_by_name(complaint, argv, refused):
+    assert f"leave out {refused}" in complaint("recover", *PLANAR, *argv)
+
+
+def test_a_demonstration_takes_no_settings_of_synthetic_experts(complaint, demonstration):
+    given = ("recover", *PLANAR, "--demonstration", demonstration[0])
+    for option, value in (("--expert", "suboptimal"), ("--rollouts", 5)):
+        assert f"leave out {option[2:]}" in complaint(*given, option, value)
+
+
+def test_the_old_name_of_the_checkpoint_is_understood_and_told(call, complaint, tmp_path):
+    job = ("recover", "--domain", "lqr", "--no-record")
+    code, out, err = call(*job, "--archive", "a.npz")
+    assert code == 0 and not err and "--checkpoint" in out and (tmp_path / "a.npz").exists()
+    assert "one of them" in complaint(*job, "--archive", "b.npz", "--checkpoint", "c.npz")
+
+
+def test_help_takes_its_defaults_from_where_they_live(call):
+    out = " ".join(call("recover", "--help")[1].split())
+    for part in (f"({Setup.centre})", f"({Setup.mode};", f"{', '.join(CENTRES)}", "who walks:",
+                 "how it is drawn and recorded:", "algorithm:", "output:"):  # fmt: skip
+        assert part in out, part
+    for option in OPTIONS.values():
+        assert f"({option.default})" in out and all(choice in out for choice in option.choices)
+
+
+def test_options_of_walkers_are_what_walkers_understand():
+    assert Protocol() == protocol_of({name: o.default for name, o in OPTIONS.items()})
+    assert OPTIONS["population"].choices == tuple(POPULATIONS)
+    assert OPTIONS["disturbance"].choices == DISTURBANCES

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from problems import without_sensitivity
 
-from walking_irl.baselines import Setting, max_margin, mwal, projection
+from walking_irl.baselines import BASELINES, Setting, max_margin, mwal, projection
 from walking_irl.cpirl.loop import cpirl
 from walking_irl.domains.lqr import LQR
 from walking_irl.domains.mdp.gridworld import Gridworld
@@ -150,8 +150,7 @@ def test_baselines_get_the_weights_and_the_span_that_their_world_allows(monkeypa
         return method(*args, **settings)
 
     for name, method in (("projection", projection), ("mwal", mwal)):
-        spied = partial(contenders._baseline, method=partial(spy, name, method))
-        monkeypatch.setitem(contenders.METHODS, name, spied)
+        monkeypatch.setitem(BASELINES, name, partial(spy, name, method))
     grid = Task("gridworld", {"size": 9, "cells": 3}, max_solves=5)
     for task, is_signed in ((grid, True), (replace(OPTIMAL, arguments={}), False)):
         run_task(replace(task, method="projection"))

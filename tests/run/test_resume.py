@@ -206,3 +206,20 @@ def test_checkpoints_with_other_arrays_are_named(call, tmp_path, name, value):
     np.savez(tmp_path / "b.npz", **arrays)
     code, _, err = call("--resume", "b.npz", "--no-record")
     assert code == 2 and "not a run that this version can resume" in err
+
+
+def test_checkpoints_of_the_first_format_are_resumed(call, tmp_path):
+    """Their settings had every domain's recording options, and no place for a domain's own."""
+    assert (
+        call("--domain", "lqr", "--max-solves", 3, "--no-record", "--checkpoint", "a.npz")[0] == 1
+    )
+    with np.load(tmp_path / "a.npz") as data:
+        arrays = dict(data)
+    about = json.loads(str(arrays["about"]))
+    del about["setup"]["options"]
+    old = {"population": "typical", "rollouts": 20, "noise": 0.02, "disturbance": "initial"}
+    about |= {"format": 1, "setup": about["setup"] | old}
+    np.savez(tmp_path / "old.npz", **{**arrays, "about": np.array(json.dumps(about))})
+    assert load_checkpoint(tmp_path / "old.npz").setup.options == {}
+    code, out, err = call("--resume", "old.npz", "--max-solves", 20, "--no-record")
+    assert code == 0 and not err and "3 known from before" in out

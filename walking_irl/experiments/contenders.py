@@ -56,10 +56,12 @@ def states(task: Task, contest: Contest) -> Iterator[State]:
     Raises:
         InvalidInputError: If there is no such method.
     """
-    if task.method not in METHODS:
-        choices = ", ".join(METHODS)
-        raise InvalidInputError(f"unknown method {task.method!r}; choose from {choices}")
-    return METHODS[task.method](task, contest)
+    if task.method in METHODS:
+        return METHODS[task.method](task, contest)
+    if task.method in BASELINES:
+        return _baseline(task, contest, BASELINES[task.method])
+    choices = ", ".join([*METHODS, *BASELINES])
+    raise InvalidInputError(f"unknown method {task.method!r}; choose from {choices}")
 
 
 def _cpirl(task: Task, contest: Contest) -> Iterator[State]:
@@ -107,9 +109,7 @@ def _cutting(task: Task, contest: Contest, has_utopia: bool) -> Iterator[State]:
         yield State(step.response.mu, np.array(M), step.w, None)
 
 
-def _baseline(
-    task: Task, contest: Contest, method: Baseline, has_queries: bool = True
-) -> Iterator[State]:
+def _baseline(task: Task, contest: Contest, method: Baseline) -> Iterator[State]:
     run = method(
         contest.oracle,
         contest.expert,
@@ -120,7 +120,7 @@ def _baseline(
     for found in run:
         mu = found.mu if task.scored == "mixture" else found.last.mu
         w = found.W[-1]
-        is_estimate = has_queries and w.min() >= 0  # signed weights are none
+        is_estimate = method is not lpal and w.min() >= 0  # signed weights are none
         yield State(mu, found.M, w if is_estimate else None, None)
 
 
@@ -128,9 +128,5 @@ METHODS: dict[str, Callable[[Task, Contest], Iterator[State]]] = {
     "cpirl": _cpirl,
     "utopia": partial(_cutting, has_utopia=True),
     "samples": partial(_cutting, has_utopia=False),
-    **{
-        name: partial(_baseline, method=method, has_queries=method is not lpal)
-        for name, method in BASELINES.items()
-    },
 }
-"""All of them by name."""
+"""CPIRL's own by name; the others are the baselines."""

@@ -142,6 +142,32 @@ def loss_chart(title: str, bars: Sequence[Loss], caption: str) -> str:
     return _svg(title, LABELS + PLOT + RESULT, y + 26, [*axis, *body])
 
 
+def marks_chart(
+    title: str,
+    columns: Sequence[str],
+    rows: Sequence[tuple[str, Sequence[bool]]],
+    caption: str,
+) -> str:
+    """A table of marks: a full dot where something holds, a hollow one where it does not."""
+    width, top = 100.0, 50.0
+    body = [
+        _text(LABELS + (i + 0.5) * width, top, name, "middle", "bold")
+        for i, name in enumerate(columns)
+    ]
+    for row, (name, marks) in enumerate(rows):
+        y = top + ROW * (row + 1)
+        body.append(_text(LABELS - 8, y + 4, name, anchor="end"))
+        for i, is_true in enumerate(marks):
+            fill = OURS if is_true else "white"
+            body.append(
+                f'<circle cx="{LABELS + (i + 0.5) * width:.1f}" cy="{y:.1f}" r="5" '
+                f'fill="{fill}" stroke="{BASELINE}"/>'
+            )
+    bottom = top + ROW * (len(rows) + 2)
+    body.append(_text(8, bottom, caption, colour="#666666"))
+    return _svg(title, LABELS + width * len(columns) + 20, bottom + 12, body)
+
+
 def _numbers(cell: str) -> tuple[float, float]:
     """Mean and standard error of "mean +- s.e." or "mean"."""
     mean, _, error = cell.partition(" +- ")

@@ -2,38 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any, NamedTuple
 
 from walking_irl.recording import Experiment, Recorder
-from walking_irl.recording.views.registry import world_of
+from walking_irl.recording.views.registry import World, world_of
 from walking_irl.run.problem import Problem
 from walking_irl.types import Iteration
 
 
-class Film:
-    """Context manager that records a run; a domain without a view is shown without a picture."""
+class Film(NamedTuple):
+    """A recorder, and what it shows of policies; a domain without a view has no picture."""
 
-    def __init__(self, problem: Problem, path: Path) -> None:
-        setup, shown = problem.setup, problem.demonstration
-        self.world = world_of(problem.domain, shown)
-        experiment = Experiment(
-            domain=setup.domain,
-            objectives=problem.objectives,
-            expert=shown.expert,
-            centre=setup.centre,
-            mode=setup.mode,
-            seed=setup.drawn_from,
-            truth=shown.truth,
-            question=problem.domain.question,
-        )
-        view = None if self.world is None else self.world.view
-        self.recorder: Recorder[Any] = Recorder(path, experiment, view)
-
-    def __enter__(self) -> Self:
-        self.recorder.__enter__()
-        return self
+    recorder: Recorder[Any]
+    world: World | None
 
     def show(self, it: Iteration) -> None:
         """Show an iteration and its policy."""
@@ -47,10 +31,21 @@ class Film:
     def _motion(self, it: Iteration) -> Any:
         return None if self.world is None else self.world.motion(it.response.policy, it.w)
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.recorder.__exit__(kind, error, trace)
+
+@contextmanager
+def film(problem: Problem, path: Path) -> Iterator[Film]:
+    """Record a run; the file appears when the block ends, also after an error."""
+    setup, shown = problem.setup, problem.demonstration
+    world = world_of(problem.domain, shown)
+    experiment = Experiment(
+        domain=setup.domain,
+        objectives=problem.objectives,
+        expert=shown.expert,
+        centre=setup.centre,
+        mode=setup.mode,
+        seed=setup.drawn_from,
+        truth=shown.truth,
+        question=problem.domain.question,
+    )
+    with Recorder(path, experiment, None if world is None else world.view) as recorder:
+        yield Film(recorder, world)

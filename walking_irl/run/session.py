@@ -114,23 +114,23 @@ def _learn(
 ) -> None:
     problem = report.problem
     with ExitStack() as stack:
-        film: Film | None = None
+        recorded: Film | None = None
         if problem.setup.record is not None:
-            from walking_irl.run.film import Film
+            from walking_irl.run.film import film
 
-            film = stack.enter_context(Film(problem, problem.setup.record))
+            recorded = stack.enter_context(film(problem, problem.setup.record))
             report.recording = str(problem.setup.record)
         for it in _timed(problem, watch, executor):
             report.iterations.append(it)
             with watch.part("recording"):
                 _keep(report, n_known)
             on_iteration(it, report)
-            if film is not None:
+            if recorded is not None:
                 with watch.part("recording"):
-                    film.show(it)
-        if film is not None:
+                    recorded.show(it)
+        if recorded is not None:
             with watch.part("recording"):
-                film.finale(_nearest(report))
+                recorded.finale(_nearest(report))
 
 
 def _timed(problem: Problem, watch: Stopwatch, executor: Executor | None) -> Iterator[Iteration]:
