@@ -44,7 +44,7 @@ def test_on_random_worlds_no_demonstrated_action_is_left_suboptimal():
     for seed in range(10):
         mdp, D, w, _, rng = seen(seed)
         found = cpirl_actions(mdp, D, rng=rng)
-        assert found.status is Status.MATCHED
+        assert found.status is Status.MATCHED and not found.notes
         r = mdp.reward(found.w)
         V = best_policy(mdp, r).V
         Q = mdp.action_values(r, V)[D.actions.ravel(), D.states.ravel()]
@@ -61,6 +61,7 @@ def test_the_shortfall_never_rises():
         found = cpirl_actions(mdp, Demonstrations(D.states, noisy), rng=rng)
         assert (np.diff(found.objective) <= 1e-12).all()
         assert found.info["shortfall"] > 0
+        assert "prefer a likelihood method" in found.notes[0]
 
 
 def test_few_demonstrations_suffice_where_the_expert_is_optimal():

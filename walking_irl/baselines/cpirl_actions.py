@@ -30,6 +30,10 @@ from walking_irl.types import Expert, Iteration, Response, Status
 EXPLAINED = 1e-9
 """g relative to max |x.V*| at which all demonstrated actions count as optimal."""
 MAX_IMPROVEMENTS = 500
+UNEXPLAINED = (
+    "no weights found make all demonstrated actions optimal: for an expert that errs or is soft "
+    "prefer a likelihood method (mce-likelihood)"
+)
 
 
 class Completed(NamedTuple):
@@ -163,7 +167,16 @@ def cpirl_actions(
         "shortfall": here.g / max(abs(float(here.w @ here.answer.mu)), 1e-300),
         "intervals": intervals,
     }
-    return from_weights(mdp, here.w, "simplex", objective=np.array(log), status=status, info=info)
+    notes = () if here.is_explained else (UNEXPLAINED,)
+    return from_weights(
+        mdp,
+        here.w,
+        "simplex",
+        objective=np.array(log),
+        status=status,
+        info=info,
+        notes=notes,
+    )
 
 
 def _starts(mdp: FiniteMDP, demonstrations: Demonstrations) -> list[Array]:
