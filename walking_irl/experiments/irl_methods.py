@@ -52,7 +52,7 @@ CAPTION = "mean loss and standard error; with the largest number of demonstratio
 
 
 THINNED = {
-    "gridworld": ("mmp-boost", "policywalk", "gpirl"),
+    "gridworld": ("mmp-boost", "maxent, algorithm 1", "policywalk", "gpirl"),
     "Objectworld": ("mmp", "policywalk", "kelley", "cpirl", "cpirl-actions"),
 }
 FEW = {"Objectworld": ("mmp", "cpirl", "cpirl-actions")}
@@ -79,7 +79,8 @@ class Config:
     Attributes:
         settings: Columns: world, kind of expert, numbers of trajectories.
         lines: Labels of the rows.
-        thinned: By world, rows that are run with the middle number of trajectories only.
+        thinned: By world, rows that are run with the middle number of trajectories only, and not
+            in columns that have only one.
         few: By world, rows that are run on the first ``few_seeds`` experts only.
         few_seeds: How many those are.
         seeds: Experts per cell.
@@ -218,6 +219,8 @@ def counts(line: Line, setting: Setting, thinned: Sequence[str]) -> tuple[int, .
     if line.is_complete or not line.method:
         return setting.counts[-1:]  # they see no trajectories
     if line.label in thinned:
+        if len(setting.counts) == 1:
+            return ()
         return (setting.counts[len(setting.counts) // 2],)
     return setting.counts
 
@@ -270,7 +273,10 @@ def _gaps(config: Config, found: dict[Cell, list[dict[str, Any]]]) -> Iterator[s
         thinned = [label for label in config.thinned.get(world, ()) if label in config.lines]
         few = [label for label in config.few.get(world, ()) if label in config.lines]
         if thinned:
-            yield f"{world}: {', '.join(thinned)} with the middle number of trajectories only."
+            yield (
+                f"{world}: {', '.join(thinned)} with the middle number of trajectories only, and "
+                "not where there is only one (n/a)."
+            )
         if few:
             seeds = min(config.few_seeds, config.seeds)
             yield f"{world}: {', '.join(few)} on the first {seeds} seeds only (3 to 20 s a cell)."

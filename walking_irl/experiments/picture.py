@@ -183,7 +183,7 @@ def maps_chart(
         levels: Number of shades.
         caption: What the shades mean.
     """
-    side, across, pitch = 112.0, 5, (136.0, 166.0)
+    side, across, pitch = 112.0, 5, (156.0, 166.0)
     body = []
     for i, (name, figure, shades, is_ours) in enumerate(tiles):
         x, y = 12 + (i % across) * pitch[0], 66 + (i // across) * pitch[1]
@@ -204,7 +204,7 @@ def maps_chart(
         )
     rows = -(-len(tiles) // across)
     bottom = 66 + rows * pitch[1]
-    lines = wrap(caption, 105)
+    lines = wrap(caption, 120)
     body += [_text(12, bottom + 14 * i, line, colour="#666666") for i, line in enumerate(lines)]
     return _svg(title, 12 + across * pitch[0], bottom + 14 * len(lines), body)
 
