@@ -9,8 +9,7 @@ from walking_irl.domains.humanoid.closed_loop.trials import Trials
 from walking_irl.domains.humanoid.closed_loop.trials import measure as walk_and_measure
 from walking_irl.domains.humanoid.domain import Humanoid
 from walking_irl.domains.lqr import LQR
-from walking_irl.domains.mdp.driving import Driving
-from walking_irl.domains.mdp.gridworld import Gridworld
+from walking_irl.domains.mdp.finite import FiniteDomain
 from walking_irl.domains.path.walking_path import SCALES, WalkingPath
 from walking_irl.rl import FiniteMDP
 
@@ -38,7 +37,7 @@ def simulated_mu(
 
 def measure(domain, response, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """mu of a policy by simulation rather than by the solver, and how far it may be off, (K,)."""
-    if isinstance(domain, Gridworld | Driving):
+    if isinstance(domain, FiniteDomain):
         mean, error = simulated_mu(domain.mdp, response.policy, rng)
         truncated = domain.mdp.discount**150 / (1 - domain.mdp.discount)
         return mean, 5 * error + truncated

@@ -9,12 +9,16 @@ from walking_irl.domains.humanoid.domain import Humanoid
 from walking_irl.domains.lqr import LQR
 from walking_irl.domains.mdp.driving import Driving
 from walking_irl.domains.mdp.gridworld import Gridworld
+from walking_irl.domains.mdp.objectworld import Objectworld
+from walking_irl.domains.mdp.random_mdp import RandomMDP
 from walking_irl.domains.path.walking_path import WalkingPath
 from walking_irl.errors import InvalidInputError
 
 MAKERS = {
     "gridworld": lambda: Gridworld(12, 3),
     "gridworld-macro": lambda: Gridworld(8, 2, "macro"),
+    "objectworld": lambda: Objectworld(12),
+    "random-mdp": RandomMDP,
     "driving": Driving,
     "lqr": lambda: LQR(3),
     "walking-path": lambda: WalkingPath([(3.0, 2.0, 90.0), (1.5, -2.5, -90.0)], n_intervals=12),

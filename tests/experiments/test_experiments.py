@@ -45,7 +45,15 @@ def untimed(outcomes):
 
 
 def test_all_thesis_tables_are_there():
-    assert list(TABLES) == ["7.1", "fig7.1", *(f"7.{i}" for i in range(2, 13))]
+    assert list(TABLES) == [
+        "2.1",
+        "3.1a",
+        "3.1b",
+        "3.1c",
+        "7.1",
+        "fig7.1",
+        *(f"7.{i}" for i in range(2, 13)),
+    ]
 
 
 @pytest.mark.parametrize(
@@ -122,9 +130,9 @@ def test_finished_cells_are_not_run_again(tmp_path, monkeypatch):
 
     def counted(task):
         calls.append(task.seed)
-        return run_task(task)
+        return task.run()
 
-    monkeypatch.setattr(runner, "run_task", counted)
+    monkeypatch.setattr(runner, "run_job", counted)
     assert Runner(cache=tmp_path).table("x", "", rows, 3) == first
     assert calls == []
     Runner(cache=tmp_path).table("x", "", rows, 4)
@@ -159,7 +167,10 @@ def test_a_failing_seed_is_reported_and_does_not_lose_the_table():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"names": ["7.99"]}, "unknown table '7.99'; choose from 7.1, fig7.1"),
+        (
+            {"names": ["7.99"]},
+            "unknown table '7.99'; choose from 2.1, 3.1a, 3.1b, 3.1c, 7.1, fig7.1",
+        ),
         ({"names": ["7.1"], "seeds": 0}, "seeds must be at least 1"),
     ],
 )

@@ -1,4 +1,5 @@
-"""The command line: ``walking-irl recover | gait | read | tables | inspect | view | domains``.
+"""The command line: ``walking-irl recover | gait | read | tables | inspect | view | domains |
+methods``.
 
 Exit codes: 0 done, 1 the method ended without success (it says why), 2 bad input or a failed write,
 130 interrupted (what was done so far is saved).
@@ -22,7 +23,7 @@ from walking_irl import __version__
 from walking_irl.cli import BAD_INPUT, FAILED, INTERRUPTED
 from walking_irl.errors import EmptyPolyhedronError, InvalidInputError, WalkingIRLError
 
-COMMANDS = ("recover", "gait", "read", "tables", "inspect", "view", "domains")
+COMMANDS = ("recover", "gait", "read", "tables", "inspect", "view", "domains", "methods")
 """One module of this package each, with ``add_parser`` and ``run``."""
 EXAMPLES = """
 examples:

@@ -10,7 +10,7 @@ from typing import Any
 
 from rich.console import Console
 
-from walking_irl.cli import DONE, FAILED, INTERRUPTED
+from walking_irl.cli import DONE, FAILED, INTERRUPTED, by_method
 from walking_irl.cli.terminal import Terminal, show_report
 from walking_irl.cli.weights import parse_weights
 from walking_irl.domains import DOMAINS, load
@@ -64,6 +64,7 @@ def add_parser(commands: Any) -> argparse.ArgumentParser:
     how_found.add_argument(
         "--resume", type=Path, metavar="FILE.npz", help="go on from a checkpoint, as it began"
     )
+    by_method.add_arguments(p)
     _add_outputs(p.add_argument_group("output"))
     return p
 
@@ -117,6 +118,9 @@ def known_options() -> dict[str, Option]:
 
 def run(args: argparse.Namespace, console: Console) -> int:
     """``walking-irl recover``."""
+    if args.method is not None:
+        return by_method.run(args, _asked(args), console)
+    by_method.refuse_alone(args)
     _rename_archive(args, console)
     before = None if args.resume is None else load_checkpoint(args.resume)
     setup = _setup(args, None if before is None else before.setup)
@@ -172,21 +176,31 @@ def _check_files(setup: Setup, rollouts: Path | None, args: argparse.Namespace) 
         check_outputs(outputs, inputs=[args.resume])
 
 
-def _setup(args: argparse.Namespace, before: Setup | None) -> Setup:
-    """The setup of a new run, or of one that goes on with what it began with."""
-    options = {
+def _asked(args: argparse.Namespace) -> dict[str, Any]:
+    """Arguments of a setup as far as they are given, files of results left aside."""
+    given: dict[str, Any] = {
+        f.name: getattr(args, f.name) for f in fields(Setup) if hasattr(args, f.name)
+    }
+    given = {k: v for k, v in given.items() if k not in ("record", "checkpoint")}
+    if args.checkpoint is not None:
+        given["checkpoint"] = args.checkpoint
+    if "weights" in given:
+        given["weights"] = parse_weights(given["weights"])
+    given["options"] = {
         name: getattr(args, f"option_{name}")
         for name in known_options()
         if hasattr(args, f"option_{name}")
     }
-    given: dict[str, Any] = {
-        f.name: getattr(args, f.name) for f in fields(Setup) if hasattr(args, f.name)
-    }
+    return given
+
+
+def _setup(args: argparse.Namespace, before: Setup | None) -> Setup:
+    """The setup of a new run, or of one that goes on with what it began with."""
+    given = _asked(args)
+    options = given.pop("options")
     given["record"] = None if args.no_record else args.record
     if before is not None:
         return _resumed(given, options, before, args)
-    if "weights" in given:
-        given["weights"] = parse_weights(given["weights"])
     if given.get("expert") == "suboptimal":
         given.setdefault("mode", "minimise")
     if args.checkpoint is None and given["record"] is not None:

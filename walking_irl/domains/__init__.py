@@ -17,6 +17,8 @@ from walking_irl.domains.humanoid.options import OPTIONS as HUMANOID_OPTIONS
 from walking_irl.domains.lqr import LQR
 from walking_irl.domains.mdp.driving import Driving
 from walking_irl.domains.mdp.gridworld import Gridworld
+from walking_irl.domains.mdp.objectworld import Objectworld
+from walking_irl.domains.mdp.random_mdp import RandomMDP
 from walking_irl.domains.path.walking_path import WalkingPath
 from walking_irl.errors import InvalidInputError
 
@@ -63,6 +65,8 @@ DOMAINS: dict[str, Entry] = {
         "policy iteration, exact linear solves",
         Gridworld.options,
     ),
+    "objectworld": Entry(Objectworld, "16 x 16 cells, coloured objects", "policy iteration"),
+    "random-mdp": Entry(RandomMDP, "50 states, random transitions", "policy iteration"),
     "driving": Entry(Driving, "three-lane road, 1531 states", "policy iteration"),
     "walking-path": Entry(
         WalkingPath,

@@ -97,13 +97,22 @@ class LQR(ExactDomain):
     def forward(self, w: Array) -> Response:
         """Optimal gains for ``w``, with d mu/d w = (d mu/d k) diag(dk/dw)."""
         k, slope = self._gains_and_slopes(checked_weights(w, self.n_objectives))
+        noise = self.policy_noise * self.discount / (1 - self.discount)
+        sensitivity = -(self.start**2 + noise) * self._slopes(k) * slope
+        return Response(k, self.evaluate(k), 0.5 * (sensitivity + sensitivity.T))
+
+    def _slopes(self, k: Array) -> Array:
+        """Derivative of objective j's cost matrix on axis i in the gain of axis i, (K, K)."""
         Q, R = self._charges()
         g = self.discount
         closed = 1 - g * (1 + k) ** 2
-        dP = 2 * R * k / closed + (Q + R * k**2) * 2 * g * (1 + k) / closed**2
-        gain = self.start**2 + self.policy_noise * g / (1 - g)
-        sensitivity = -gain * dP * slope
-        return Response(k, self.evaluate(k), 0.5 * (sensitivity + sensitivity.T))
+        slopes: Array = 2 * R * k / closed + (Q + R * k**2) * 2 * g * (1 + k) / closed**2
+        return slopes
+
+    def policy_gradient(self, policy: Array) -> Array:
+        """Gradient of each objective in each gain, d mu_j / d k_i at [i, j], shape (K, K)."""
+        noise = self.policy_noise * self.discount / (1 - self.discount)
+        return -(self.start**2 + noise) * self._slopes(np.asarray(policy, dtype=np.float64)).T
 
     def expert(self, w_E: Array, rng: np.random.Generator) -> Expert:
         """Exact features of the optimal gains, perturbed where ``perturbation`` > 0."""

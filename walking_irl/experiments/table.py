@@ -43,6 +43,7 @@ class Table:
         notes: Sentences below the table.
         header: Seeds, versions and machine.
         raw: Outcomes behind the rows, for JSON.
+        chart: The picture as SVG, where the columns are not the common ones.
     """
 
     name: str
@@ -52,6 +53,7 @@ class Table:
     notes: tuple[str, ...] = ()
     header: dict[str, Any] = field(default_factory=dict)
     raw: tuple[dict[str, Any], ...] = ()
+    chart: str = ""
 
     def to_markdown(self) -> str:
         """The table with its header and notes."""
@@ -69,6 +71,8 @@ class Table:
 
     def picture(self) -> str:
         """The table's main figures as SVG."""
+        if self.chart:
+            return self.chart
         title = f"Table {self.name}: {self.title}"
         if self.columns != COLUMNS:
             return steps_chart(self.title, [row[:3] for row in self.rows])

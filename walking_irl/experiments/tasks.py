@@ -55,6 +55,10 @@ class Task:
         """The job as JSON types."""
         return asdict(self)
 
+    def run(self) -> dict[str, Any]:
+        """See :func:`run_task`."""
+        return run_task(self)
+
 
 def synthetic_expert(
     task: Task, domain: Any, rng: np.random.Generator

@@ -129,7 +129,9 @@ def nearest_optimum(gait: Gait, spec: WalkerSpec) -> tuple[Gait, float]:
         for tether in TETHERS:
             y = _held(x, w, spec, tether)
             lin = solver.linearise(y)
-            w = _least(solver.sensitivity(w, lin)[0])
+            known = solver.sensitivity(w, lin)
+            if known is not None:  # else no minimum yet: the next tether is looser
+                w = _least(known[0])
         found.append((solver.decrement(w, lin), x, w, y))
         if found[-1][0] < NEARLY:
             break
@@ -143,8 +145,10 @@ def nearest_optimum(gait: Gait, spec: WalkerSpec) -> tuple[Gait, float]:
             away = _distance(y, x, free)
             if away < max(SAME, 2 * best[0]):
                 best = (away, solver.decrement(w, lin), y)
-            slope = solver.sensitivity(w, lin)[1]
-            w = _towards(w, _without(free, slope), _without(free, x - y))
+            known = solver.sensitivity(w, lin)
+            if known is None:
+                break
+            w = _towards(w, _without(free, known[1]), _without(free, x - y))
     return Gait.from_vector(best[2], gait.q.shape[1]), best[1]
 
 

@@ -10,6 +10,7 @@ from scipy import sparse
 from walking_irl.arrays import Array, Indices
 from walking_irl.domains.contract import Option
 from walking_irl.domains.mdp.finite import FiniteDomain
+from walking_irl.domains.mdp.grid import grid_transitions
 from walking_irl.errors import InvalidInputError
 from walking_irl.rl.finite_mdp import Actions, FiniteMDP
 from walking_irl.types import Objective
@@ -123,17 +124,8 @@ def _objectives(cells: int) -> tuple[Objective, ...]:
 
 
 def _transitions(size: int, success: float) -> sparse.csr_array:
-    """Sparse (4 * S, S): a step off the grid stays where it is."""
-    S = size**2
-    place = np.stack(np.divmod(np.arange(S), size), axis=1)
-    target = np.clip(place + MOVES[:, None], 0, size - 1) @ np.array([size, 1])  # (4, S)
-    blocks = []
-    for action in range(4):
-        p = np.full(4, (1 - success) / 4)
-        p[action] += success
-        rows, values = np.tile(np.arange(S), 4), np.repeat(p, S)
-        blocks.append(sparse.csr_array((values, (rows, target.ravel())), shape=(S, S)))
-    return sparse.vstack(blocks).tocsr()
+    """Sparse (4 * S, S): a move that is not obeyed goes any way, the chosen one included."""
+    return grid_transitions(size, MOVES, success * np.eye(4) + (1 - success) / 4)
 
 
 def _regions(size: int, cells: int, variant: str) -> Indices:

@@ -12,7 +12,14 @@ from walking_irl.arrays import Array
 from walking_irl.domains.contract import Option
 from walking_irl.domains.exact import ExactDomain
 from walking_irl.domains.path.model import costs, integrate
-from walking_irl.domains.path.solver import Path, bent_start, polished, slsqp_path, straight_start
+from walking_irl.domains.path.solver import (
+    Path,
+    bent_start,
+    polished,
+    reduced_gradient,
+    slsqp_path,
+    straight_start,
+)
 from walking_irl.domains.weights import checked_weights
 from walking_irl.errors import InvalidInputError, SolverError
 from walking_irl.types import Expert, Objective, Response
@@ -121,6 +128,12 @@ class WalkingPath(ExactDomain):
         if len(parts) == len(paths):
             sensitivity = -np.mean(parts, axis=0) / np.outer(SCALES, SCALES)
         return Response(paths, mu, sensitivity, info={"iterations": sum(p.n_iter for p in paths)})
+
+    def policy_gradient(self, policy: tuple[Path, ...]) -> Array:
+        """Gradient of each objective in the controls that its goal leaves free, shape (p, 5)."""
+        parts = [reduced_gradient(p.z, goal) for p, goal in zip(policy, self.goals, strict=True)]
+        G: Array = -np.concatenate(parts) / (len(parts) * SCALES)
+        return G
 
     def suboptimal_expert(self, w_E: Array, rng: np.random.Generator) -> Expert:
         """Expert whose weights differ from goal to goal: no single weights explain it."""
