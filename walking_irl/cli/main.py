@@ -1,5 +1,4 @@
-"""The command line: ``walking-irl recover | gait | read | tables | inspect | view | domains |
-methods``.
+"""The command line, ``walking-irl COMMAND``: one module of this package a command.
 
 Exit codes: 0 done, 1 the method ended without success (it says why), 2 bad input or a failed write,
 130 interrupted (what was done so far is saved).
