@@ -2,8 +2,8 @@
 
 import pytest
 
-from walking_irl.domains.humanoid.closed_loop.trials import DISTURBANCES, Protocol
-from walking_irl.domains.humanoid.domain import protocol_of
+from walking_irl.domains.humanoid.closed_loop.trials import DISTURBANCES, Trials
+from walking_irl.domains.humanoid.domain import trials_of
 from walking_irl.domains.humanoid.options import OPTIONS
 from walking_irl.domains.humanoid.population import POPULATIONS
 from walking_irl.geometry.centres import CENTRES
@@ -135,6 +135,6 @@ def test_help_takes_its_defaults_from_where_they_live(call):
 
 
 def test_options_of_walkers_are_what_walkers_understand():
-    assert Protocol() == protocol_of({name: o.default for name, o in OPTIONS.items()})
+    assert Trials() == trials_of({name: o.default for name, o in OPTIONS.items()})
     assert OPTIONS["population"].choices == tuple(POPULATIONS)
     assert OPTIONS["disturbance"].choices == DISTURBANCES
