@@ -28,8 +28,8 @@ from walking_irl.arrays import Array
 from walking_irl.geometry.centres import CENTRES, Centre
 from walking_irl.geometry.centres.ellipsoid import cvxpy_ellipsoid
 from walking_irl.geometry.centres.gravity import gravity
-from walking_irl.geometry.halfspaces import whitened_rows
-from walking_irl.geometry.polyhedron import WeightPolyhedron, plane_basis
+from walking_irl.geometry.plane import plane_basis
+from walking_irl.geometry.polyhedron import WeightPolyhedron
 
 DIMENSIONS, FACETS = (3, 5, 10, 20), (50, 200)
 TARGET = 5.0
@@ -70,7 +70,7 @@ def cvxpy_chebyshev(P: WeightPolyhedron) -> float:
 
 def cvxpy_volume(P: WeightPolyhedron) -> float:
     """Logarithm of det B of the largest ellipsoid, in the coordinates our own method solves in."""
-    found = cvxpy_ellipsoid(whitened_rows(P.A, P.barrier, P.b))
+    found = cvxpy_ellipsoid(P.whitened.rows)
     scale = np.log(np.abs(np.diagonal(P.barrier.R))).sum()
     return float(0.5 * np.linalg.slogdet(found.square)[1] - scale)
 

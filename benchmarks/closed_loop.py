@@ -18,7 +18,8 @@ from typing import NamedTuple
 import numpy as np
 from bench import table, verdict
 
-from walking_irl.domains.humanoid.body.anatomy import Walker, load_walker
+from walking_irl.domains.humanoid.body.anatomy import Walker
+from walking_irl.domains.humanoid.body.load import load_walker
 from walking_irl.domains.humanoid.closed_loop.environment import Push
 from walking_irl.domains.humanoid.closed_loop.policy import TrackingPolicy, tracking_policy
 from walking_irl.domains.humanoid.closed_loop.rollout import rollout

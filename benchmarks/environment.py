@@ -13,11 +13,12 @@ import mujoco
 import numpy as np
 from bench import medians, table, verdict
 
-from walking_irl.domains.humanoid.body.anatomy import Walker, load_walker
+from walking_irl.domains.humanoid.body.anatomy import Walker
+from walking_irl.domains.humanoid.body.load import load_walker
 from walking_irl.domains.humanoid.closed_loop.environment import environment, start_of
 from walking_irl.domains.humanoid.closed_loop.policy import TrackingPolicy, tracking_policy
 from walking_irl.domains.humanoid.closed_loop.rollout import rollout
-from walking_irl.domains.humanoid.costs.objectives import REFERENCE_WEIGHTS
+from walking_irl.domains.humanoid.costs.defaults import REFERENCE_WEIGHTS
 from walking_irl.domains.humanoid.gait.library import load_gaits
 from walking_irl.environments.agent import TrackingAgent
 from walking_irl.environments.walker import WalkerEnv

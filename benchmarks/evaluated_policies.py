@@ -4,7 +4,7 @@ The same recoveries with and without policies that cost no solve, by cuts alone 
 no probes). Where such policies come from:
 
 iterates       what the solver passed through on its way: gaits of the planar humanoid, policies of
-               policy iteration. A walking path arrives only when SLSQP is done, and the regulator's
+               policy iteration. A walking path arrives only when SLSQP is done, and the LQR's
                gains are a formula: these two have none
 library        best policies for other weights, known from before: ten random weights, for the
                humanoid the shipped gaits
@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 from unittest import mock
 
@@ -27,19 +28,17 @@ import numpy as np
 from bench import table
 
 from walking_irl.arrays import Array
+from walking_irl.cpirl.endings import IntervalsNarrowerThan
 from walking_irl.cpirl.loop import cpirl
-from walking_irl.cpirl.stopping import IntervalsNarrowerThan
-from walking_irl.domains.humanoid.closed_loop.trials import Protocol
+from walking_irl.domains.contract import Request
 from walking_irl.domains.humanoid.domain import Humanoid
-from walking_irl.domains.humanoid.gait.library import load_library
-from walking_irl.domains.humanoid.learner import solver_for
-from walking_irl.domains.humanoid.population import typical_weights
+from walking_irl.domains.humanoid.learner import known_gaits, solver_for
+from walking_irl.domains.humanoid.spec import PLANAR
 from walking_irl.domains.lqr import LQR
 from walking_irl.domains.mdp.gridworld import Gridworld
 from walking_irl.domains.path.walking_path import SCALES, WalkingPath
 from walking_irl.geometry.centres import CENTRES
 from walking_irl.rl.finite_mdp import FiniteMDP
-from walking_irl.run.humanoid_case import MIN_WEIGHT
 from walking_irl.types import Expert, Forward, Response, Status
 
 MOST = 100
@@ -132,7 +131,8 @@ def regulator() -> Setting:
 
 def gridworld() -> Setting:
     domain = Gridworld(cells=3)
-    mdp, library = domain.mdp, optima(domain, domain.random_weights)
+    draw = partial(domain.random_weights, "sparse")
+    mdp, library = domain.mdp, optima(domain, draw)
 
     def learner(expert: Expert) -> Learner:
         passed: list[Array] = []
@@ -155,9 +155,7 @@ def gridworld() -> Setting:
         }
         return Learner(forward, sources)
 
-    return Setting(
-        "gridworld", lambda rng: domain.expert(domain.random_weights(rng), rng), learner, None, 10
-    )
+    return Setting("gridworld", lambda rng: domain.expert(draw(rng), rng), learner, None, 10)
 
 
 def watched(passed: list[Array]) -> Callable[[FiniteMDP, Any], Any]:
@@ -173,7 +171,8 @@ def watched(passed: list[Array]) -> Callable[[FiniteMDP, Any], Any]:
 
 def walking_path() -> Setting:
     domain = WalkingPath()
-    library = optima(domain, domain.random_weights)
+    draw = partial(domain.random_weights, "interior")
+    library = optima(domain, draw)
 
     def learner(expert: Expert) -> Learner:
         own = np.array([path.F for path in expert.demonstration])
@@ -185,32 +184,32 @@ def walking_path() -> Setting:
         sources = {"library": once(lambda: library), "demonstration": one_changed}
         return Learner(domain.forward, sources)
 
-    return Setting(
-        "walking-path", lambda rng: domain.expert(domain.random_weights(rng), rng), learner, 0.05, 5
-    )
+    return Setting("walking-path", lambda rng: domain.expert(draw(rng), rng), learner, 0.05, 5)
 
 
 def humanoid() -> Setting:
-    domain, solver = Humanoid(planar=True), solver_for(True)
+    domain, solver = Humanoid("humanoid-planar"), solver_for(PLANAR)
 
     def learner(expert: Expert) -> Learner:
         x, rng = expert.demonstration.to_vector(), np.random.default_rng(0)
 
         def shaken() -> Array:
-            starts = [solver.shake(x, SHAKE, rng) for _ in range(LIBRARY)]
-            return -np.array([solver.problem.evaluate(v).folded() for v in starts])
+            starts = [solver.perturb(x, SHAKE, rng) for _ in range(LIBRARY)]
+            return -np.array([solver.problem.evaluate(v).total_costs() for v in starts])
 
         sources: dict[str, Source] = {
             "iterates": lambda answer: answer.evaluated,
-            "library": once(lambda: -np.array([g.folded for g in load_library(True).values()])),
+            "library": once(lambda: -np.array([g.total_costs for g in known_gaits(PLANAR)])),
             "demonstration": once(shaken),
         }
-        return Learner(domain.learner(expert), sources)
+        tools = domain.learner(expert, {}, rng=rng)
+        return Learner(tools.forward, sources)
 
     def expert(rng: np.random.Generator) -> Expert:
-        return domain.demonstrate(typical_weights(rng), rng, Protocol(0)).expert
+        request = Request(options={"rollouts": 0})
+        return domain.demonstrate(request, rng=rng).expert
 
-    return Setting("humanoid-planar", expert, learner, 0.1, 3, MIN_WEIGHT)
+    return Setting("humanoid-planar", expert, learner, 0.1, 3, domain.defaults.min_weight)
 
 
 def recover(setting: Setting, expert: Expert, centre: str, names: Sequence[str]) -> Outcome:
@@ -228,7 +227,7 @@ def recover(setting: Setting, expert: Expert, centre: str, names: Sequence[str])
     last = list(steps)[-1]
     if last.status not in (Status.MATCHED, Status.CONVERGED):
         raise RuntimeError(f"{setting.name}, {' + '.join(names)}: {last.status.value}")
-    return Outcome(last.k + 1, forward.n_policies, float(np.ptp(last.intervals, axis=1).max()))
+    return Outcome(last.k + 1, forward.n_policies, last.widest)
 
 
 def compare(setting: Setting, centre: str, n_experts: int) -> tuple[list[list[str]], str]:

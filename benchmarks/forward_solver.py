@@ -1,9 +1,10 @@
-"""Time of one iteration of the gait solver, against its MuJoCo calls and a dense solver.
+"""Time of one iteration of the gait solver, against MuJoCo's own calls and a dense solver.
 
-The same query is answered again and again: another weight vector, from the reference gait. The
-derivative calls alone are ``mj_inverse`` and ``mjd_inverseFD`` at the states at which the solver
-linearised. The dense solver is ``mujoco.minimize.least_squares`` on the same weighted residuals;
-putting their Jacobian into a dense matrix is not counted.
+The same query is answered again and again: another weight vector, from the reference gait. At the
+states at which the solver linearised, its closed-form derivatives are timed against
+``mjd_inverseFD``; the floor of an evaluation is one ``mj_inverse`` a knot. The dense solver is
+``mujoco.minimize.least_squares`` on the same weighted residuals; putting their Jacobian into a
+dense matrix is not counted.
 """
 
 from __future__ import annotations
@@ -19,14 +20,16 @@ from bench import medians, table, verdict
 from mujoco import minimize
 
 from walking_irl.arrays import Array
-from walking_irl.domains.humanoid.body.anatomy import load_walker
 from walking_irl.domains.humanoid.gait.library import load_library
-from walking_irl.domains.humanoid.learner import NUDGE, solver_for
+from walking_irl.domains.humanoid.learner import solver_for
+from walking_irl.domains.humanoid.optimiser.dynamics.inverse import FD_STEP
 from walking_irl.domains.humanoid.optimiser.linearisation import weighted
-from walking_irl.domains.humanoid.optimiser.solver import FD_STEPS, GaitSolver, Stage, stage
+from walking_irl.domains.humanoid.optimiser.solver import GaitSolver
+from walking_irl.domains.humanoid.optimiser.stages import Stage, stage
 from walking_irl.domains.humanoid.optimiser.transcription import ROOT_PENALTY
+from walking_irl.domains.humanoid.spec import HUMANOID, PLANAR
 
-MAX_OF_DERIVATIVES, MIN_OF_DENSE = 2.0, 15.0
+MAX_OF_FLOOR, MIN_OF_DIFFERENCES, MIN_OF_DENSE = 33.0, 4.0, 15.0
 
 
 class Query:
@@ -46,9 +49,9 @@ class Query:
         self.evaluations = 0
         differentiate, evaluate = problem.differentiate, problem.evaluate
 
-        def seen(x: Array, eps: float) -> Any:
-            self.visited.append(x.copy())
-            return differentiate(x, eps)
+        def seen(ev: Any) -> Any:
+            self.visited.append(ev.x.copy())
+            return differentiate(ev)
 
         def counted(x: Array) -> Any:
             self.evaluations += 1
@@ -62,10 +65,18 @@ class Query:
 
     def solve(self) -> int:
         """Solve, and return the number of iterations."""
-        return self.solver.solve(self.w, self.x, self.stages).iterations
+        root = self.solver.dual(self.x)
+        return self.solver.solve(self.w, self.x, self.stages, root=root).iterations
+
+    def derivatives(self) -> None:
+        """Closed-form derivatives at the linearised states."""
+        problem = self.solver.problem
+        for x in self.visited:
+            q, v, a, _ = problem.motion(x)
+            problem.dynamics.at(q, v[:-1], a)
 
     def mujoco_calls(self, derivatives: bool) -> Callable[[], None]:
-        """MuJoCo's part of the solve: at the linearised states, or of all evaluations."""
+        """MuJoCo's differences at the linearised states, or its part of all evaluations."""
         problem = self.solver.problem
         model, n = problem.walker.model, problem.n_knots
         data = mujoco.MjData(model)
@@ -79,9 +90,10 @@ class Query:
             for q, v, a in states:
                 for i in range(n):
                     data.qpos[:], data.qvel[:], data.qacc[:] = q[i], v[i], a[i]
-                    mujoco.mj_inverse(model, data)
                     if derivatives:
-                        mujoco.mjd_inverseFD(model, data, FD_STEPS[0], False, *out, None)
+                        mujoco.mjd_inverseFD(model, data, FD_STEP, False, *out, None)
+                    else:
+                        mujoco.mj_inverse(model, data)
 
         return run
 
@@ -93,14 +105,15 @@ def dense_iteration(query: Query, iterations: int) -> float:
     dense = 0.0
 
     def residual(x: Array) -> Array:
-        return weighted(problem.evaluate(x.ravel()), w, ROOT_PENALTY).flat()[:, None]
+        ev = problem.evaluate(x.ravel())
+        return weighted(problem.stack, ev, w, ROOT_PENALTY).flat()[:, None]
 
     def jacobian(x: Array, r: Array) -> Array:
         nonlocal dense
-        lin = solver.linearise(x.ravel())
+        at = solver.linearise(x.ravel()).at(w, ROOT_PENALTY)
         start = time.process_time()
         unit = np.eye(x.size)
-        J = np.column_stack([lin.times(e, w, ROOT_PENALTY).flat() for e in unit])
+        J = np.column_stack([at.times(e).flat() for e in unit])
         dense += time.process_time() - start
         return J
 
@@ -118,29 +131,38 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=7)
     parser.add_argument("--quick", action="store_true", help="planar, few iterations, once")
     args = parser.parse_args()
-    planar, repeats = args.planar or args.quick, 1 if args.quick else args.repeats
-    library = load_library(planar)
-    solver = solver_for(planar)
+    spec = PLANAR if args.planar or args.quick else HUMANOID
+    repeats = 1 if args.quick else args.repeats
+    library = load_library(spec.body)
+    solver = solver_for(spec)
     start = library["reference"].gait.to_vector()
-    x = solver.shake(start, NUDGE, np.random.default_rng(0))
+    x = start
     query = Query(solver, library[args.gait].w, x, (stage(1e6, 3 if args.quick else 30, 1e-7),))
-    parts = (query.solve, query.mujoco_calls(True), query.mujoco_calls(False))
-    whole, derivatives, inverse = (t / query.iterations for t in medians(parts, repeats))
+    calls = (query.derivatives, query.mujoco_calls(True), query.mujoco_calls(False))
+    times_of = [t / query.iterations for t in medians((query.solve, *calls), repeats)]
+    whole, derivatives, differences, inverse = times_of
+    floor = inverse / query.evaluations * query.iterations
     dense = float(np.median([dense_iteration(query, 2) for _ in range(1 if args.quick else 3)]))
-    names = ["gait solver, one iteration", "MuJoCo's derivatives alone", "MuJoCo's evaluations"]
-    times = dict(zip(names, (whole, derivatives, inverse), strict=True))
-    times["linear algebra and the rest"] = whole - derivatives - inverse
-    times["mujoco.minimize.least_squares, one iteration"] = dense
-    rows = [[n, f"{1e3 * t:.1f}", f"{t / derivatives:.2f}"] for n, t in times.items()]
+    times = {
+        "gait solver, one iteration": whole,
+        "its derivatives, closed form": derivatives,
+        "the same by mjd_inverseFD": differences,
+        "its evaluations by mj_inverse": inverse,
+        "one evaluation by mj_inverse": floor,
+        "mujoco.minimize.least_squares, one iteration": dense,
+    }
+    rows = [[n, f"{1e3 * t:.1f}", f"{t / floor:.1f}"] for n, t in times.items()]
     print(
-        f"{load_walker(planar).name}: {query.iterations} iterations, {query.evaluations} "
+        f"{spec.walker.name}: {query.iterations} iterations, {query.evaluations} "
         f"evaluations, {len(x)} unknowns\n"
     )
-    print(table(["part", "ms", "of derivatives"], rows) + "\n")
-    ratio, gain = whole / derivatives, dense / whole
-    text = f"one iteration takes {ratio:.2f} x its derivative calls (target <= 2)"
-    print(verdict(text, ratio <= MAX_OF_DERIVATIVES))
-    text = f"it is {gain:.0f} x faster than the dense solver's (target >= 15)"
+    print(table(["part", "ms", "of one evaluation"], rows) + "\n")
+    ratio, faster, gain = whole / floor, differences / derivatives, dense / whole
+    text = f"one iteration takes {ratio:.0f} x one evaluation by mj_inverse (target <= 33)"
+    print(verdict(text, ratio <= MAX_OF_FLOOR))
+    text = f"derivatives are {faster:.1f} x faster than mjd_inverseFD (target >= 4)"
+    print(verdict(text, faster >= MIN_OF_DIFFERENCES))
+    text = f"an iteration is {gain:.0f} x faster than the dense solver's (target >= 15)"
     print(verdict(text, gain >= MIN_OF_DENSE))
 
 

@@ -19,21 +19,21 @@ import numpy as np
 from bench import table, verdict
 
 from walking_irl.cpirl.loop import cpirl
+from walking_irl.domains.contract import Request
 from walking_irl.domains.humanoid import domain as domain_module
-from walking_irl.domains.humanoid import solver as gait_solver
-from walking_irl.domains.humanoid.closed_loop.trials import Protocol, measure
+from walking_irl.domains.humanoid.closed_loop.trials import measure
 from walking_irl.domains.humanoid.domain import Humanoid, exact_expert
 from walking_irl.domains.humanoid.gait.library import load_library
-from walking_irl.domains.humanoid.optimiser.linearisation import Linearisation
-from walking_irl.domains.humanoid.optimiser.normal_equations import Factor, NormalMatrix
+from walking_irl.domains.humanoid.optimiser import newton
+from walking_irl.domains.humanoid.optimiser.linearisation import Linearisation, Weighted
+from walking_irl.domains.humanoid.optimiser.ring import BorderedMatrix, Factor
 from walking_irl.domains.humanoid.optimiser.transcription import Transcription
-from walking_irl.domains.humanoid.population import typical_weights
-from walking_irl.run.case import MAX_SOLVES
-from walking_irl.run.humanoid_case import MIN_WEIGHT
 from walking_irl.run.session import PROBE
 from walking_irl.types import Expert, Iteration
 
-DERIVATIVES = "MuJoCo's inverse dynamics and derivatives"
+EVALUATIONS = "MuJoCo's inverse dynamics"
+DERIVATIVES = "first derivatives of inverse dynamics"
+HESSIANS = "Hessians"
 ALGEBRA = "linear algebra of the gait solver"
 REST = "rest of the gait solver"
 MEASURE = "closed-loop walks and their policies"
@@ -81,13 +81,14 @@ class Clock:
 def timers(clock: Clock) -> Iterator[None]:
     """Wrap the parts of the gait solver."""
     wrapped: list[tuple[Any, str, str]] = [
-        (Transcription, "_over_knots", DERIVATIVES),
-        (gait_solver, "normal_matrix", ALGEBRA),
-        (NormalMatrix, "factor", ALGEBRA),
+        (Transcription, "_over_knots", EVALUATIONS),
+        (Transcription, "differentiate", DERIVATIVES),
+        (newton, "half_hessian", HESSIANS),
+        (BorderedMatrix, "factor", ALGEBRA),
         (Factor, "solve", ALGEBRA),
         (Linearisation, "__init__", ALGEBRA),
-        (Linearisation, "times", ALGEBRA),
-        (Linearisation, "transpose_times", ALGEBRA),
+        (Weighted, "times", ALGEBRA),
+        (Weighted, "transpose_times", ALGEBRA),
     ]
     patches = [mock.patch.object(o, n, clock.wrap(p, getattr(o, n))) for o, n, p in wrapped]
     for patch in patches:
@@ -99,32 +100,35 @@ def timers(clock: Clock) -> Iterator[None]:
             patch.stop()
 
 
-def make_expert(clock: Clock, domain: Humanoid, protocol: Protocol, seed: int) -> Expert:
-    """The expert of hidden weights, timed."""
+def make_expert(clock: Clock, domain: Humanoid, rollouts: int, seed: int) -> Expert:
+    """The expert of drawn weights, timed."""
     rng = np.random.default_rng(seed)
     with timers(clock), mock.patch.object(domain_module, "measure", clock.wrap(MEASURE, measure)):
         with clock.part(REST):
-            return domain.demonstrate(typical_weights(rng), rng, protocol).expert
+            request = Request(options={"rollouts": rollouts})
+            return domain.demonstrate(request, rng=rng).expert
 
 
 def shipped_expert(domain: Humanoid) -> Expert:
     """An exact expert that walks the shipped reference gait."""
-    shipped = load_library(domain.planar)["reference"]
-    return exact_expert(shipped.gait, shipped.folded)
+    shipped = load_library(domain.spec.body)["reference"]
+    return exact_expert(shipped.gait, shipped.total_costs)
 
 
 def recover(
-    clock: Clock, domain: Humanoid, expert: Expert, protocol: Protocol, seed: int, max_solves: int
+    clock: Clock, domain: Humanoid, expert: Expert, rollouts: int, seed: int, max_solves: int
 ) -> list[Iteration]:
     """One recovery, timed."""
-    remeasure = domain.remeasure(protocol, seed)
+    rng = np.random.default_rng([seed, 1])
+    learner = domain.learner(expert, {"rollouts": rollouts}, rng=rng)
+    measured = learner.measure
     steps = cpirl(
-        clock.wrap(REST, domain.learner(expert)),
+        clock.wrap(REST, learner.forward),
         expert,
         max_solves=max_solves,
-        min_weight=MIN_WEIGHT,
+        min_weight=domain.defaults.min_weight,
         rng=np.random.default_rng(seed),
-        measure=None if remeasure is None else clock.wrap(MEASURE, remeasure),
+        measure=None if measured is None else clock.wrap(MEASURE, measured),
         probe=PROBE,
     )
     with timers(clock), clock.part(QUERIES):
@@ -134,7 +138,7 @@ def recover(
 def report(expert: Clock, learner: Clock, steps: list[Iteration]) -> str:
     totals = [sum(clock.seconds.values()) for clock in (expert, learner)]
     rows = []
-    for part in (DERIVATIVES, ALGEBRA, REST, MEASURE, QUERIES):
+    for part in (EVALUATIONS, DERIVATIVES, HESSIANS, ALGEBRA, REST, MEASURE, QUERIES):
         own = [clock.seconds[part] for clock in (expert, learner)]
         rows.append([part, *(f"{t:.2f}" for t in own), f"{sum(own) / sum(totals):.1%}"])
     rows.append(["all", *(f"{t:.2f}" for t in totals), "100.0%"])
@@ -152,22 +156,22 @@ def report(expert: Clock, learner: Clock, steps: list[Iteration]) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seed", type=int, default=100, help="draws the hidden weights")
+    parser.add_argument("--seed", type=int, default=100, help="draws the ground-truth weights")
     parser.add_argument("--rollouts", type=int, default=20, help="of the expert; 0: exact features")
     parser.add_argument("--planar", action="store_true")
     parser.add_argument(
         "--quick", action="store_true", help="planar, the shipped gait as expert, two solves"
     )
     args = parser.parse_args()
-    domain = Humanoid(args.planar or args.quick)
-    protocol = Protocol(0 if args.quick else args.rollouts)
+    domain = Humanoid("humanoid-planar" if args.planar or args.quick else "humanoid")
+    rollouts = 0 if args.quick else args.rollouts
     expert_clock, clock = Clock(), Clock()
     if args.quick:
         expert = shipped_expert(domain)
     else:
-        expert = make_expert(expert_clock, domain, protocol, args.seed)
-    max_solves = 2 if args.quick else MAX_SOLVES
-    steps = recover(clock, domain, expert, protocol, args.seed, max_solves)
+        expert = make_expert(expert_clock, domain, rollouts, args.seed)
+    max_solves = 2 if args.quick else domain.defaults.max_solves
+    steps = recover(clock, domain, expert, rollouts, args.seed, max_solves)
     print(f"{domain.name}, seed {args.seed}, one process, one thread\n")
     print(report(expert_clock, clock, steps))
 

@@ -2,9 +2,9 @@
 
     python demos/four_centres.py [--seed 6] [--objectives 3] [--cuts ac] [--record centres.rrd]
 
-The expert is a linear-quadratic regulator with hidden weights. One centre (--cuts) chooses the
+The expert is an LQR with weights that the learner does not know. One centre (--cuts) chooses the
 queries, the others watch: all four are drawn in the same shrinking polyhedron, beside them how far
-each is from the hidden weights, and which share of the volume its query would leave. Needs no
+each is from the true weights, and which share of the volume its query would leave. Needs no
 screen; look at the recording with ``walking-irl view centres.rrd``.
 """
 
@@ -18,6 +18,7 @@ import numpy as np
 
 from walking_irl.arrays import Array
 from walking_irl.cpirl.loop import cpirl
+from walking_irl.domains.contract import Truth
 from walking_irl.domains.lqr import LQR
 from walking_irl.errors import EmptyPolyhedronError
 from walking_irl.geometry.centres import CENTRES
@@ -35,9 +36,9 @@ MAX_SOLVES = 16
 
 
 def main() -> None:
-    """Recover the regulator's weights by cuts alone, and watch four centres."""
+    """Recover the LQR's weights by cuts alone, and watch four centres."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seed", type=int, default=6, help="draws the hidden weights")
+    parser.add_argument("--seed", type=int, default=6, help="draws the ground-truth weights")
     parser.add_argument("--objectives", type=int, default=3, choices=(3, 4), help="weights, K")
     parser.add_argument("--cuts", default="ac", choices=list(CENTRES), help="whose queries cut")
     parser.add_argument("--record", type=Path, default=Path("centres.rrd"), metavar="FILE.rrd")
@@ -45,8 +46,8 @@ def main() -> None:
 
     rng = np.random.default_rng(args.seed)
     domain = LQR(args.objectives)
-    w_hidden = rng.dirichlet(np.ones(args.objectives))
-    expert = domain.expert(w_hidden, rng)
+    w_E = rng.dirichlet(np.ones(args.objectives))
+    expert = domain.expert(w_E, rng)
 
     def forward(w: Array) -> Response:
         return replace(domain.forward(w), sensitivity=None)  # cuts alone, no Newton steps
@@ -62,7 +63,7 @@ def main() -> None:
         expert=expert,
         centre=args.cuts,
         seed=args.seed,
-        w_expert=w_hidden,
+        truth=Truth(w_E, expert.mu),
         others=tuple(NAMES.values()),
     )
     run = cpirl(forward, expert, centre=args.cuts, max_solves=MAX_SOLVES, rng=rng)
@@ -76,7 +77,7 @@ def main() -> None:
             except EmptyPolyhedronError:  # too thin by now: the weights are known
                 break
             recorder.iteration(it, others=points)
-            errors = [float(np.abs(point.w - w_hidden).sum()) for point in points]
+            errors = [float(np.abs(point.w - w_E).sum()) for point in points]
             print(f"{it.k + 1:5d}" + "".join(f"{error:9.5f}" for error in errors))
             shares.append([point.share for point in points])
     means = np.exp(np.mean(np.log(shares), axis=0))

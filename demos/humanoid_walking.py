@@ -13,61 +13,60 @@ from pathlib import Path
 import numpy as np
 
 from walking_irl.cpirl.loop import cpirl
+from walking_irl.cpirl.probes import Probing
 from walking_irl.cpirl.summary import summarise
-from walking_irl.domains.humanoid.closed_loop.trials import Protocol
+from walking_irl.domains.contract import Request
 from walking_irl.domains.humanoid.domain import Humanoid
-from walking_irl.domains.humanoid.population import typical_weights
 from walking_irl.recording import Experiment, Recorder
-from walking_irl.recording.views.gait import WalkerView
-from walking_irl.run.humanoid_case import one_cycle
-from walking_irl.run.session import workers
+from walking_irl.recording.views.registry import world_of
+from walking_irl.workers import workers
 
-MIN_WEIGHT = 0.005
 PROBE = 1e-4
 
 
 def main() -> None:
     """Make an expert, recover its weights, record how."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seed", type=int, default=0, help="draws the hidden weights")
+    parser.add_argument("--seed", type=int, default=0, help="draws the ground-truth weights")
     parser.add_argument("--record", type=Path, default=Path("walking.rrd"), metavar="FILE.rrd")
     parser.add_argument("--planar", action="store_true", help="a smaller body, in a plane")
     args = parser.parse_args()
 
+    domain = Humanoid("humanoid-planar" if args.planar else "humanoid")
+    options = {"rollouts": 20, "noise": 0.02}
     rng = np.random.default_rng(args.seed)
-    domain = Humanoid(planar=args.planar)
     with workers() as executor:
-        # Somebody walks for weights that only the last line of this file may look at.
-        w_hidden = typical_weights(rng)
-        protocol = Protocol(rollouts=20, noise=0.02)
-        shown = domain.demonstrate(w_hidden, rng, protocol, executor)
-        expert = shown.expert
+        # Somebody walks for weights that only scoring and pictures may look at.
+        shown = domain.demonstrate(Request(options=options), rng=rng, executor=executor)
+        expert, truth = shown.expert, shown.truth
 
         # The learner gets what was recorded: mean features, their error, and the mean gait.
+        learner_rng = np.random.default_rng([args.seed, 1])
+        learner = domain.learner(expert, options, rng=learner_rng, executor=executor)
         iterations = cpirl(
-            domain.learner(expert, threads=2),
+            learner.forward,
             expert,
             centre="ac",
-            max_solves=20,
-            min_weight=MIN_WEIGHT,
+            max_solves=domain.defaults.max_solves,
+            min_weight=domain.defaults.min_weight,
             rng=np.random.default_rng(args.seed),
-            measure=domain.remeasure(protocol, args.seed, executor),
-            executor=executor,
-            probe=PROBE,
+            measure=learner.measure,
+            probe=Probing(PROBE, executor),
         )
         experiment = Experiment(
             domain=domain.name,
             objectives=domain.objectives,
             expert=expert,
             seed=args.seed,
-            w_expert=w_hidden,
+            truth=truth,
+            question=domain.question,
         )
-        world = WalkerView(domain.walker.model, one_cycle(domain, shown.gait))
+        view, motion = world_of(domain, shown)
         done = []
-        with Recorder(args.record, experiment, world) as recorder:
+        with Recorder(args.record, experiment, view) as recorder:
             for it in iterations:
                 print(f"{it.k + 1:3d}  {it.rule.value:35s} regret {it.regret:.2e}")
-                recorder.iteration(it, one_cycle(domain, it.response.policy))
+                recorder.iteration(it, motion(it.response.policy, it.w))
                 done.append(it)
 
     found = summarise(done, expert, domain.objectives)
@@ -77,7 +76,7 @@ def main() -> None:
     if found.weakest is not None:
         print(f"least revealed: {found.weakest}")
     print(f"recording: {args.record}")
-    print(f"L1 distance to the hidden weights: {np.abs(found.w - w_hidden).sum():.5f}")
+    print(f"L1 distance to the ground-truth weights: {np.abs(found.w - truth.w).sum():.5f}")
 
 
 if __name__ == "__main__":  # worker processes import this file

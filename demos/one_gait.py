@@ -13,18 +13,16 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 
-from walking_irl.cli.gait import png
-from walking_irl.domains.humanoid.costs.objectives import REFERENCE_WEIGHTS
+from walking_irl.domains.humanoid.costs.defaults import REFERENCE_WEIGHTS
 from walking_irl.domains.humanoid.domain import Humanoid
 from walking_irl.domains.humanoid.gait.gait import Gait, whole_cycle
 from walking_irl.domains.humanoid.gait.pictures import SIDE, photograph
-from walking_irl.files import write_file
+from walking_irl.files import write_file, write_png
 from walking_irl.recording import Clock
 from walking_irl.recording.blueprint import motion_blueprint
-from walking_irl.recording.views.gait import WalkerView
+from walking_irl.recording.views.registry import world_of
 from walking_irl.recording.writer import FLUSH_SECONDS, open_stream
-from walking_irl.run.humanoid_case import one_cycle
-from walking_irl.run.session import workers
+from walking_irl.workers import workers
 
 POSTURES = 6
 TIMES = 3.0
@@ -38,7 +36,7 @@ def main() -> None:
     parser.add_argument("--planar", action="store_true", help="a smaller body, in a plane")
     args = parser.parse_args()
 
-    domain = Humanoid(planar=args.planar)
+    domain = Humanoid("humanoid-planar" if args.planar else "humanoid")
     names = [o.name for o in domain.objectives]
     gaits: dict[str, Gait] = {}
     costs = []
@@ -55,24 +53,24 @@ def main() -> None:
     print(f"each cost is lowest in the gait that weighs it most: {best} of {len(names)}")
 
     record(args.record, domain, gaits)
-    write_file(args.png, png(np.vstack([photo_row(domain, gait) for gait in gaits.values()])))
+    write_png(args.png, np.vstack([photo_row(domain, gait) for gait in gaits.values()]))
     print(f"wrote {args.record} and {args.png}, rows in the order above")
 
 
 def record(path: Path, domain: Humanoid, gaits: dict[str, Gait]) -> None:
     """Eight cycles of each gait, one after the other."""
     stream, memory = open_stream()
-    world: WalkerView = WalkerView(domain.walker.model)
-    stream.send_blueprint(motion_blueprint(world))
+    view, motion = world_of(domain)
+    stream.send_blueprint(motion_blueprint(view))
     stream.send_recording_name("six gaits")
-    world.log_static(stream)
+    view.log_static(stream)
     first = 0
     for k, (name, gait) in enumerate(gaits.items()):
         clock = Clock(first, k)
         clock.set(stream)
         text = f"# {name} x {TIMES:g}\n\n{gait.speed:.2f} m/s, steps of {gait.step_length:.2f} m"
         stream.log("summary", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
-        first += world.log_iteration(stream, clock, one_cycle(domain, gait), True)
+        first += view.log_iteration(stream, clock, motion(gait), True)
     stream.flush(timeout_sec=FLUSH_SECONDS)
     write_file(path, memory.drain_as_bytes())
 

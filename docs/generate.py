@@ -119,6 +119,7 @@ def objectives() -> dict[str, str]:
 def _compared(name: str) -> str:
     """Speed, cadence, step and costs of a shipped gait beside the reference."""
     from walking_irl.domains.humanoid.costs.objectives import OBJECTIVES
+
     from walking_irl.domains.humanoid.gait.library import load_library
 
     library = load_library(True)

@@ -3,8 +3,9 @@
 A first guess is drawn from textbook joint angles (D. A. Winter, Biomechanics and Motor Control of
 Human Movement, 4th ed. 2009: key points of hip, knee and ankle at natural cadence), which neither
 stands on the ground nor obeys physics. A homotopy in the root penalty makes it walk, first under
-weights that keep it calm, then under the reference weights. Every gait then hops: it is shaken,
-solved again, and the cheapest gait is kept. Nothing but this file decides what is shipped.
+weights that keep it calm, then under the reference weights. Every gait then hops between
+basins: it is perturbed, solved again, and the cheapest gait is kept. Nothing but this file decides
+what is shipped.
 """
 
 from __future__ import annotations
@@ -15,17 +16,18 @@ from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
 
-import mujoco
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from walking_irl.arrays import Array
-from walking_irl.domains.humanoid.body.anatomy import Walker, load_walker
-from walking_irl.domains.humanoid.costs.objectives import OBJECTIVES, REFERENCE_WEIGHTS
+from walking_irl.domains.humanoid.body.anatomy import Walker, lowest_points
+from walking_irl.domains.humanoid.costs.defaults import OBJECTIVES, REFERENCE_WEIGHTS
 from walking_irl.domains.humanoid.gait.gait import Gait
+from walking_irl.domains.humanoid.gait.library import PREFIX, load_gaits, own_gaits
 from walking_irl.domains.humanoid.learner import polish, solver_for
-from walking_irl.domains.humanoid.optimiser.solver import stage
+from walking_irl.domains.humanoid.optimiser.stages import stage
 from walking_irl.domains.humanoid.population import typical_weights
+from walking_irl.domains.humanoid.spec import HUMANOID, PLANAR, WalkerSpec
 
 N_KNOTS = 40
 SPEED, HALF_PERIOD = 1.25, 0.55  # of the guess [m/s], [s]
@@ -48,7 +50,7 @@ TO_WALK = (
 SEARCH = (stage(1e3, 60, 1e-5), stage(1e4, 100, 1e-6))
 FINISH = (stage(1e5, 60, 1e-6), stage(1e6, 150, 1e-8))
 HOPS = {"reference": 24, "other": 8}
-SHAKES = np.deg2rad([1.0, 3.0])
+AMPLITUDES = np.deg2rad([1.0, 3.0])
 
 
 def guess(walker: Walker) -> Array:
@@ -69,21 +71,11 @@ def guess(walker: Walker) -> Array:
     return Gait(q, SPEED * HALF_PERIOD, HALF_PERIOD).to_vector()
 
 
-def lowest_points(walker: Walker, q: Array) -> Array:
-    """Height of the lowest contact sphere of every posture [m]."""
-    model, out = walker.model, []
-    data = mujoco.MjData(model)
-    spheres = np.nonzero(model.geom_conaffinity == 1)[0]
-    for row in q:
-        data.qpos[:] = row
-        mujoco.mj_kinematics(model, data)
-        out.append(np.min(data.geom_xpos[spheres, 2] - model.geom_size[spheres, 0]))
-    return np.array(out)
-
-
-def hop(planar: bool, w: Array, x: Array, hops: int, pool: ProcessPoolExecutor, seed: int) -> Array:
-    """Shake, solve again, keep the cheapest; in rounds of two, then finish at full penalty."""
-    solver, rng = solver_for(planar), np.random.default_rng(seed)
+def basin_hops(
+    spec: WalkerSpec, w: Array, x: Array, hops: int, pool: ProcessPoolExecutor, seed: int
+) -> Array:
+    """Perturb, solve again, keep the cheapest; in rounds of two, then finish at full penalty."""
+    solver, rng = solver_for(spec), np.random.default_rng(seed)
     pick = SEARCH[-1].penalty
 
     def cost(y: Array) -> float:
@@ -91,23 +83,23 @@ def hop(planar: bool, w: Array, x: Array, hops: int, pool: ProcessPoolExecutor, 
 
     best = x
     for _ in range(hops // 2):
-        starts = [solver.shake(best, amplitude, rng) for amplitude in SHAKES]
-        jobs = [pool.submit(polish, planar, w, start, SEARCH) for start in starts]
+        starts = [solver.perturb(best, amplitude, rng) for amplitude in AMPLITUDES]
+        jobs = [pool.submit(polish, spec, w, start, SEARCH) for start in starts]
         best = min([best, *(job.result().x for job in jobs)], key=cost)
-    return polish(planar, w, best, FINISH).x
+    return polish(spec, w, best, FINISH).x
 
 
-def reference(planar: bool, x: Array, pool: ProcessPoolExecutor) -> Array:
+def reference(spec: WalkerSpec, x: Array, pool: ProcessPoolExecutor) -> Array:
     """The reference gait, from a guess ``x``."""
     for s in TO_WALK:
-        x = polish(planar, CALM, x, (s,)).x
-    x = polish(planar, REFERENCE_WEIGHTS, x, SEARCH).x
-    return hop(planar, REFERENCE_WEIGHTS, x, HOPS["reference"], pool, seed=0)
+        x = polish(spec, CALM, x, (s,)).x
+    x = polish(spec, REFERENCE_WEIGHTS, x, SEARCH).x
+    return basin_hops(spec, REFERENCE_WEIGHTS, x, HOPS["reference"], pool, seed=0)
 
 
 def in_the_plane(x: Array) -> Array:
     """The joints that the planar body has, of a gait of the spatial one."""
-    spatial, planar = load_walker(False).joints, load_walker(True).joints
+    spatial, planar = HUMANOID.walker.joints, PLANAR.walker.joints
     gait = Gait.from_vector(x, len(spatial))
     return Gait(gait.q[:, [spatial.index(j) for j in planar]], *x[-2:]).to_vector()
 
@@ -123,45 +115,49 @@ def weights_to_ship() -> dict[str, Array]:
     return out
 
 
-def make(planar: bool, start: Array, pool: ProcessPoolExecutor) -> dict[str, Array]:
+def make(spec: WalkerSpec, start: Array, pool: ProcessPoolExecutor) -> dict[str, Array]:
     """Arrays of one body, ready to be saved."""
     weights = {"reference": REFERENCE_WEIGHTS, **weights_to_ship()}
-    found = {"reference": reference(planar, start, pool)}
+    found = {"reference": reference(spec, start, pool)}
     for k, (name, w) in enumerate(weights.items()):
         if name not in found:
-            x = exchange(planar, w, found.values(), pool)
-            found[name] = hop(planar, w, x, HOPS["other"], pool, seed=k)
+            x = exchange(spec, w, found.values(), pool)
+            found[name] = basin_hops(spec, w, x, HOPS["other"], pool, seed=k)
     for name, w in weights.items():
-        found[name] = exchange(planar, w, found.values(), pool)
-        report(planar, name, w, found[name])
-    body, problem = "planar" if planar else "spatial", solver_for(planar).problem
+        found[name] = exchange(spec, w, found.values(), pool)
+        report(spec, name, w, found[name])
+    prefix, problem = PREFIX.get(spec.body, ""), solver_for(spec).problem
     return {
-        f"{body}_name": np.array(list(weights)),
-        f"{body}_w": np.array(list(weights.values())),
-        f"{body}_x": np.array([found[name] for name in weights]),
-        f"{body}_folded": np.array([problem.evaluate(found[name]).folded() for name in weights]),
+        f"{prefix}name": np.array(list(weights)),
+        f"{prefix}w": np.array(list(weights.values())),
+        f"{prefix}x": np.array([found[name] for name in weights]),
+        f"{prefix}folded": np.array(
+            [problem.evaluate(found[name]).total_costs() for name in weights]
+        ),
     }
 
 
-def exchange(planar: bool, w: Array, gaits: Collection[Array], pool: ProcessPoolExecutor) -> Array:
+def exchange(
+    spec: WalkerSpec, w: Array, gaits: Collection[Array], pool: ProcessPoolExecutor
+) -> Array:
     """The best gait for ``w`` near any of the four known ones that are cheapest under it."""
-    problem = solver_for(planar).problem
+    problem = solver_for(spec).problem
 
     def cost(x: Array) -> float:
-        return float(w @ problem.evaluate(x).folded())
+        return float(w @ problem.evaluate(x).total_costs())
 
     near = sorted(gaits, key=cost)[:4]
-    jobs = [pool.submit(polish, planar, w, x, SEARCH + FINISH) for x in near]
-    jobs += [pool.submit(polish, planar, w, x, FINISH) for x in near[:2]]
+    jobs = [pool.submit(polish, spec, w, x, SEARCH + FINISH) for x in near]
+    jobs += [pool.submit(polish, spec, w, x, FINISH) for x in near[:2]]
     return min([near[0], *(job.result().x for job in jobs)], key=cost)
 
 
-def report(planar: bool, name: str, w: Array, x: Array) -> None:
+def report(spec: WalkerSpec, name: str, w: Array, x: Array) -> None:
     """One line on a gait."""
-    solver = solver_for(planar)
+    solver = solver_for(spec)
     lin = solver.linearise(x)
     print(
-        f"{name:14s} J {w @ lin.evaluation.folded():.5f} "
+        f"{name:14s} J {w @ lin.evaluation.total_costs():.5f} "
         f"decrement {solver.decrement(w, lin):.0e} speed {x[-2] / x[-1]:.2f} m/s",
         flush=True,
     )
@@ -171,11 +167,19 @@ def main() -> None:
     """Make all gaits and save them."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, default=Path(__file__).with_name("gaits.npz"))
-    out = parser.parse_args().out
+    parser.add_argument(
+        "--body", type=Path, help="an MJCF file: make its gaits, from the shipped ones, beside it"
+    )
+    args = parser.parse_args()
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
-        spatial = make(False, guess(load_walker(False)), pool)
-        planar = make(True, in_the_plane(spatial["spatial_x"][0]), pool)
-    np.savez_compressed(out, **spatial, **planar)
+        if args.body is None:
+            spatial = make(HUMANOID, guess(HUMANOID.walker), pool)
+            planar = make(PLANAR, in_the_plane(spatial[PREFIX[HUMANOID.body] + "x"][0]), pool)
+            np.savez_compressed(args.out, **spatial, **planar)
+        else:
+            spec = WalkerSpec(str(args.body))
+            start = next(iter(load_gaits(spec.body).values())).to_vector()
+            np.savez_compressed(own_gaits(args.body), **make(spec, start, pool))
 
 
 if __name__ == "__main__":

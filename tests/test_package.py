@@ -89,7 +89,7 @@ def test_wheel_in_a_fresh_environment_finds_its_models(tmp_path):
         "from walking_irl.domains.humanoid.gait.library import load_gaits\n"
         "from walking_irl.files import model_path\n"
         f"for name in {MODELS}: print(model_path(name))\n"
-        "print(len(load_gaits(planar=True)))\n"
+        "print(len(load_gaits('humanoid-planar')))\n"
     )
     done = subprocess.run(
         [python, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True

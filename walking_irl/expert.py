@@ -7,8 +7,8 @@ built from the corner mu + error + suboptimality keeps the expert's weights.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Any, Literal
+from collections.abc import Callable, Sequence
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from scipy.stats import t as student
@@ -18,6 +18,7 @@ from walking_irl.errors import InvalidInputError
 from walking_irl.types import Expert, Response
 
 Bound = Literal["student", "bernstein", "hoeffding"]
+Trajectory = TypeVar("Trajectory")
 
 
 def half_widths(
@@ -89,6 +90,88 @@ def expert_from_returns(
         n_samples=len(returns),
         demonstration=demonstration,
     )
+
+
+def expert_from_trajectories(
+    trajectories: Sequence[Trajectory],
+    features: Callable[[Trajectory], Any],
+    discount: float | None = None,
+    *,
+    bound: Bound = "student",
+    confidence: float = 0.95,
+    ranges: Array | None = None,
+    suboptimality: float = 0.0,
+    demonstration: Any = None,
+) -> Expert:
+    """Expert known by recorded trajectories, with error bars.
+
+    >>> walks = [[1.0, 2.0, 0.5], [1.5, 1.5], [0.5, 2.0, 1.0, 0.5]]
+    >>> expert = expert_from_trajectories(walks, lambda x: [[-v, -(v**2)] for v in x])
+    >>> expert.mu.round(3).tolist(), expert.n_samples
+    ([-3.5, -5.083], 3)
+
+    Args:
+        trajectories: At least 2, independent of each other, of any kind and length.
+        features: Maps one of them to the features of its steps, shape (T, K), or to their sums,
+            shape (K,). Larger is better: costs enter with a minus sign, as in the ``mu`` of the
+            learner's solver, which must mean the same quantity.
+        discount: Weight of each step relative to the one before, in (0, 1]; None for plain sums.
+        bound: Which error bars, see :func:`half_widths`.
+        confidence: Probability that all of them hold.
+        ranges: Of the sums, shape (K,), for the distribution-free bounds.
+        suboptimality: By how much a policy may beat the expert, in units of ``w.mu``.
+        demonstration: What was seen of the policy itself, or None.
+
+    Raises:
+        InvalidInputError: If there are fewer than 2 trajectories, or their features have different
+            or wrong shapes or are not finite; the message names the trajectory.
+    """
+    if discount is not None and not 0.0 < discount <= 1.0:
+        raise InvalidInputError(f"the discount must lie in (0, 1], got {discount}")
+    trajectories = list(trajectories)
+    if len(trajectories) < 2:
+        raise InvalidInputError(
+            f"need at least 2 trajectories to know how far their mean may be off, got "
+            f"{len(trajectories)}; an expert that is known exactly is Expert(mu, error=0 * mu)"
+        )
+    sums = [_summed(features(t), discount, i) for i, t in enumerate(trajectories)]
+    for i, total in enumerate(sums):
+        if total.shape != sums[0].shape:
+            raise InvalidInputError(
+                f"trajectory {i} has {len(total)} features, trajectory 0 has {len(sums[0])}"
+            )
+    return expert_from_returns(
+        np.array(sums),
+        bound=bound,
+        confidence=confidence,
+        ranges=ranges,
+        suboptimality=suboptimality,
+        demonstration=demonstration,
+    )
+
+
+def _summed(features: Any, discount: float | None, index: int) -> Array:
+    """Sum of a trajectory's features, (T, K) or (K,) -> (K,)."""
+    name = f"the features of trajectory {index}"
+    try:
+        phi = np.asarray(features, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InvalidInputError(
+            f"{name} must be numbers of shape (T, K) or (K,): {error}"
+        ) from None
+    if phi.ndim not in (1, 2) or phi.size == 0:
+        raise InvalidInputError(f"{name} must have shape (T, K) or (K,), got {phi.shape}")
+    if not np.isfinite(phi).all():
+        raise InvalidInputError(f"{name} must be finite")
+    if phi.ndim == 1:
+        if discount is not None:
+            raise InvalidInputError(
+                f"{name} have shape {phi.shape}: sums already; a discount needs those of each step"
+            )
+        return phi
+    weights = np.ones(len(phi)) if discount is None else discount ** np.arange(len(phi))
+    total: Array = weights @ phi
+    return total
 
 
 def paired_half_widths(learner: Array, expert: Array, *, confidence: float = 0.95) -> Array:

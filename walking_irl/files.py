@@ -2,13 +2,38 @@
 
 from __future__ import annotations
 
+import csv
+import io
+import json
+import math
 import os
-from collections.abc import Sequence
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
+from zipfile import BadZipFile
 
-from walking_irl.errors import InvalidInputError
+import numpy as np
+from numpy.typing import NDArray
+
+from walking_irl.errors import InvalidInputError, WalkingIRLError
 
 _PACKAGE = Path(__file__).resolve().parent
+
+UNREADABLE = (
+    OSError,
+    ValueError,
+    EOFError,
+    TypeError,
+    AttributeError,
+    KeyError,
+    NotImplementedError,
+    BadZipFile,
+    csv.Error,
+    zlib.error,
+)
+"""What NumPy and csv raise on files that they cannot read; an .npy named .npz is one of them."""
 
 
 def model_path(name: str) -> Path:
@@ -28,40 +53,93 @@ def model_path(name: str) -> Path:
     raise InvalidInputError(f"no model file {name!r}; there are {', '.join(exist) or 'none'}")
 
 
-def write_file(path: Path, content: bytes) -> None:
-    """Write beside the target and rename, so that no half-written file stays.
-
-    Raises:
-        InvalidInputError: If the file cannot be written; what was there before is still there.
-    """
-    _check_name(path)
-    try:
-        replace_file(path, content)
-    except OSError as error:
-        raise InvalidInputError(f"cannot write {path}: {error.strerror or error}") from error
-
-
-def part_of(path: Path) -> Path:
-    """Where a file of that name is written before it is complete."""
-    return path.with_name(f".{path.name}.{os.getpid()}.part")
-
-
-def replace_file(path: Path, content: bytes) -> None:
+def write_file(
+    path: Path, content: bytes, error: type[WalkingIRLError] = InvalidInputError
+) -> None:
     """Write beside ``path``, then rename: a reader sees the old file or the whole new one.
 
-    Raises:
-        OSError: If it cannot be written; nothing is left behind.
+    Args:
+        path: The file.
+        content: Its content.
+        error: What to raise where it cannot be written; nothing is left behind then.
     """
-    part = part_of(path)
-    try:
-        with part.open("xb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        part.replace(path)
-    except BaseException:
-        part.unlink(missing_ok=True)
-        raise
+    check_name(path, error)
+    part = _part_of(path)
+    with _explained(path, error):
+        try:
+            with part.open("xb") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
+            part.replace(path)
+        except BaseException:
+            part.unlink(missing_ok=True)
+            raise
+
+
+def write_json(path: Path, content: Mapping[str, Any]) -> None:
+    """Write JSON; numbers that are not finite become null.
+
+    Raises:
+        InvalidInputError: If the file cannot be written.
+    """
+    write_file(path, (json.dumps(to_plain(content), indent=1, allow_nan=False) + "\n").encode())
+
+
+def write_arrays(path: Path, arrays: Mapping[str, Any]) -> None:
+    """Write arrays by name as a compressed ``.npz``.
+
+    Raises:
+        InvalidInputError: If the file cannot be written.
+    """
+    content = io.BytesIO()
+    np.savez_compressed(content, allow_pickle=False, **arrays)
+    write_file(path, content.getvalue())
+
+
+def write_png(path: Path, picture: NDArray[np.uint8]) -> None:
+    """Write a picture (height, width, 3) as PNG.
+
+    Raises:
+        InvalidInputError: If the file cannot be written.
+    """
+    from PIL import Image
+
+    content = io.BytesIO()
+    Image.fromarray(picture).save(content, format="PNG", optimize=True)
+    write_file(path, content.getvalue())
+
+
+def to_plain(value: Any) -> Any:
+    """A value as JSON types; numbers that are not finite become None."""
+    if isinstance(value, Mapping):
+        return {str(k): to_plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [to_plain(v) for v in value]
+    if isinstance(value, np.ndarray | np.generic):
+        return to_plain(value.tolist())
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def check_writable(path: str | Path, error: type[WalkingIRLError] = InvalidInputError) -> Path:
+    """Find out before long work that a file cannot be written.
+
+    Creates and removes an empty file beside ``path``; an existing file of that name stays as it is.
+
+    Args:
+        path: The file.
+        error: What to raise if its folder is missing or read-only, or its name is not a file's.
+
+    Returns:
+        The path.
+    """
+    path = Path(path)
+    check_name(path, error)
+    with _explained(path, error):
+        part = _part_of(path)
+        part.open("xb").close()
+        part.unlink()
+    return path
 
 
 def check_outputs(paths: Sequence[Path | None], inputs: Sequence[Path | None] = ()) -> None:
@@ -79,7 +157,7 @@ def check_outputs(paths: Sequence[Path | None], inputs: Sequence[Path | None] = 
     read = [path.resolve() for path in inputs if path is not None]
     written = [path.resolve() for path in given]
     for path in given:
-        _check_name(path)
+        check_name(path)
         if written.count(path.resolve()) > 1:
             raise InvalidInputError(f"two results cannot both be written to {path}; name two files")
         if path.resolve() in read:
@@ -98,13 +176,30 @@ def check_ending(path: Path | None, *endings: str) -> None:
         raise InvalidInputError(f"expected a file name in {' or '.join(endings)}, got {path}")
 
 
-def _check_name(path: Path) -> None:
-    try:
+def check_name(path: Path, error: type[WalkingIRLError] = InvalidInputError) -> None:
+    """Raise ``error`` where a path cannot be that of an ordinary file."""
+    with _explained(path, error):
         if not path.parent.is_dir():
-            raise InvalidInputError(f"cannot write {path}: there is no folder {path.parent}")
+            raise error(
+                f"cannot write {path}: there is no folder {path.parent}; create it or name another"
+            )
         if path.is_dir():
-            raise InvalidInputError(f"cannot write {path}: it is a folder; name a file")
+            raise error(f"cannot write {path}: it is a folder; name a file")
         if path.exists() and not path.is_file():
-            raise InvalidInputError(f"cannot write {path}: it is a device; name an ordinary file")
-    except OSError as error:
-        raise InvalidInputError(f"cannot write {path}: {error.strerror or error}") from error
+            raise error(f"cannot write {path}: it is a device; name an ordinary file")
+
+
+def _part_of(path: Path) -> Path:
+    """Where a file of that name is written before it is complete."""
+    return path.with_name(f".{path.name}.{os.getpid()}.part")
+
+
+@contextmanager
+def _explained(path: Path, error: type[WalkingIRLError]) -> Iterator[None]:
+    try:
+        yield
+    except OSError as problem:
+        raise error(
+            f"cannot write {path}: {problem.strerror or problem}; free space, change the "
+            f"permissions of {path.parent} or choose another folder"
+        ) from problem

@@ -9,7 +9,7 @@ from __future__ import annotations
 import enum
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal, NamedTuple, Protocol, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -95,6 +95,22 @@ class Status(enum.Enum):
     STALLED = "the query repeats itself and the solver finds nothing better"
     BUDGET = "the budget of forward solves is spent"
 
+    @property
+    def is_success(self) -> bool:
+        """Whether a run that ended so answers what the expert's weights are, or that none are."""
+        return self in (
+            Status.MATCHED,
+            Status.CONVERGED,
+            Status.GAP_CLOSED,
+            Status.DOMINATED,
+            Status.MIXTURE_DOMINATES,
+        )
+
+    @property
+    def has_weights(self) -> bool:
+        """Whether a run that ended so has found weights to be sure of."""
+        return self in (Status.MATCHED, Status.CONVERGED, Status.GAP_CLOSED)
+
 
 class Rule(enum.Enum):
     """How a query was chosen."""
@@ -136,6 +152,11 @@ class Iteration:
     estimate: Array
     status: Status
 
+    @property
+    def widest(self) -> float:
+        """Width of the widest interval."""
+        return float(np.diff(self.intervals, axis=1).max())
+
 
 @dataclass(frozen=True)
 class Rollout:
@@ -156,26 +177,3 @@ class Rollout:
     a: Array
     u: Array
     sensors: Array
-
-
-class Domain(Protocol):
-    """A world with objectives, and a solver for the best policy under given weights."""
-
-    name: str
-    objectives: tuple[Objective, ...]
-
-    def forward(self, w: Array) -> Response:
-        """Solve "best policy for w"; deterministic; knows nothing of any expert."""
-        ...
-
-    def expert(self, w_E: Array, rng: np.random.Generator) -> Expert:
-        """Synthetic expert for hidden weights, solved at least as hard as any learner's query."""
-        ...
-
-    def pack(self, policy: Any) -> Array:
-        """A policy as one array, for files."""
-        ...
-
-    def unpack(self, packed: Array) -> Any:
-        """Inverse of :meth:`pack`."""
-        ...

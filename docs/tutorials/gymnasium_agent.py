@@ -1,5 +1,4 @@
-"""
-An agent of reinforcement learning
+"""An agent of reinforcement learning
 ==================================
 
 Somebody trained an agent in a Gymnasium environment. What was it trained for? Its episodes are
@@ -61,7 +60,7 @@ print(it.status.value)
 # whole set of them. What matters is inside the intervals, and whoever acts for the recovered weights
 # does as well:
 
-for (low, high), estimate, true in zip(it.intervals, it.estimate, w_true):
+for (low, high), estimate, true in zip(it.intervals, it.estimate, w_true, strict=True):
     print(f"{estimate:.2f} in {low:.2f} .. {high:.2f}   (truth {true})")
     assert low <= true <= high
 best = w_true @ domain.forward(w_true).mu

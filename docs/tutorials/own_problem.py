@@ -1,5 +1,4 @@
-"""
-A problem of your own
+"""A problem of your own
 =====================
 
 All that the method asks of a problem is a function from weights to the best policy and its
@@ -55,6 +54,8 @@ print(it.status.value)
 # With finitely many ways, a whole set of weights explains the same choice. What can be said of each
 # weight is an interval, and the ground truth lies inside:
 
-for name, (low, high), true in zip(["time", "climbing", "traffic"], it.intervals, w_true):
+for name, (low, high), true in zip(
+    ["time", "climbing", "traffic"], it.intervals, w_true, strict=True
+):
     print(f"{name:10s} {low:.3f} .. {high:.3f}   (truth {true})")
     assert low <= true <= high

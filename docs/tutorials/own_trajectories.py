@@ -1,5 +1,4 @@
-"""
-Trajectories of your own
+"""Trajectories of your own
 ========================
 
 An expert is known by trajectories: arrays of states and actions. Here forty runs of a noisy

@@ -1,5 +1,4 @@
-"""
-The set of weights, cut by cut
+"""The set of weights, cut by cut
 ==============================
 
 Three weights that sum to one are points of a triangle. Every answer of the forward solver cuts it
@@ -43,7 +42,7 @@ def drawn(P, axis):
 
 iterations = list(cpirl(forward, expert, max_solves=6, rng=rng))[:6]
 fig, axes = plt.subplots(1, len(iterations), figsize=(12, 2.6))
-for axis, it in zip(axes, iterations):
+for axis, it in zip(axes, iterations, strict=True):
     axis.add_patch(plt.Polygon(CORNERS, fill=False, lw=0.8))
     drawn(it.polyhedron, axis)
     axis.plot(*(it.w @ CORNERS), "o", color="tab:blue", ms=5)

@@ -3,7 +3,7 @@ import pytest
 from problems import TWO_POLICIES, Menu, random_menu
 from small_mdps import random_mdp
 
-from walking_irl.baselines import kelley, lpal, max_margin, mwal, projection
+from walking_irl.baselines import Setting, kelley, lpal, max_margin, mwal, projection
 from walking_irl.baselines.apprentice import closest_mixture
 from walking_irl.baselines.mwal import regret_bound
 from walking_irl.domains.lqr import LQR
@@ -11,6 +11,9 @@ from walking_irl.domains.mdp.finite import FiniteDomain
 from walking_irl.errors import InvalidInputError
 from walking_irl.geometry.game import game_lp
 from walking_irl.types import Expert, Objective, Status
+
+RNG = np.random.default_rng(0)
+ONE_SIDED = Setting(is_signed=False)
 
 
 def finite_domain(seed=0):
@@ -83,7 +86,7 @@ def test_one_sided_variants_query_only_the_simplex(method):
     rng = np.random.default_rng(0)
     w_E = np.array([0.2, 0.3, 0.5])
     expert = problem.expert(w_E, rng)
-    found = list(method(problem.forward, expert, rng=rng, max_solves=40, is_signed=False))
+    found = list(method(problem.forward, expert, rng=rng, max_solves=40, setting=ONE_SIDED))
     for a in found:
         assert a.W.min() >= 0
         np.testing.assert_allclose(a.W.sum(axis=1), 1.0)
@@ -94,7 +97,7 @@ def test_one_sided_variants_query_only_the_simplex(method):
 @pytest.mark.parametrize("n_rounds", [100, 1000])
 def test_mwal_keeps_its_regret_bound(n_rounds):
     menu, expert = Menu(np.eye(4)), Expert(np.array([0.1, 0.2, 0.25, 0.25]), np.zeros(4))
-    *_, last = mwal(menu.forward, expert, span=0.9, max_solves=n_rounds)
+    *_, last = mwal(menu.forward, expert, rng=RNG, setting=Setting(span=0.9), max_solves=n_rounds)
     loss = 0.05 - (last.mu - expert.mu).min()  # the value of the game is 0.05
     assert -1e-12 <= loss <= regret_bound(4, n_rounds, 0.9)
     assert regret_bound(4, n_rounds, 0.9) < 0.4
@@ -104,7 +107,7 @@ def test_mwal_keeps_its_regret_bound(n_rounds):
 def test_mwal_takes_the_published_step():
     menu = random_menu(np.random.default_rng(0), 3)
     expert = menu.expert(np.array([0.2, 0.5, 0.3]))
-    *_, last = mwal(menu.forward, expert, span=20.0, max_solves=2)
+    *_, last = mwal(menu.forward, expert, rng=RNG, setting=Setting(span=20.0), max_solves=2)
     d = last.responses[0].mu - expert.mu
     beta = 1 / (1 + np.sqrt(2 * np.log(3) / 2))
     factor = beta ** ((0.1 * d + 2) / 4)  # the paper's form at gamma = 0.9
@@ -114,18 +117,20 @@ def test_mwal_takes_the_published_step():
 def test_mwal_refuses_a_span_that_a_policy_exceeds():
     menu = random_menu(np.random.default_rng(0), 3)
     with pytest.raises(InvalidInputError, match="too small"):
-        list(mwal(menu.forward, menu.expert(np.eye(3)[0]), span=1e-3))
+        expert = menu.expert(np.eye(3)[0])
+        list(mwal(menu.forward, expert, rng=RNG, setting=Setting(span=1e-3)))
 
 
 def test_lpal_and_kelley_find_the_value_of_the_game():
     for seed in range(4):
         domain, rng = finite_domain(seed)
         expert = achievable_expert(domain, rng)
-        apprentice = lpal(domain, expert)
+        setting = Setting(mdp=domain.mdp)
+        (apprentice,) = lpal(domain.forward, expert, rng=rng, setting=setting)
         margin = apprentice.last.info["margin"]
         assert (apprentice.mu - expert.mu).min() == pytest.approx(margin, abs=1e-7)
         assert margin >= -1e-7
-        *_, last = kelley(domain.forward, expert, tol=1e-7, max_solves=200)
+        *_, last = kelley(domain.forward, expert, rng=rng, tol=1e-7, max_solves=200)
         assert last.status is Status.GAP_CLOSED
         assert -game_lp(last.M - expert.mu).value == pytest.approx(margin, abs=1e-5)
         assert (last.mu - expert.mu).min() == pytest.approx(margin, abs=1e-5)
@@ -135,7 +140,7 @@ def test_lpal_and_kelley_find_the_value_of_the_game():
 
 def test_kelley_ends_on_the_two_policy_problem_with_the_even_mixture():
     expert = Expert(np.array([0.4, 0.4]), np.zeros(2))
-    *_, last = kelley(TWO_POLICIES.forward, expert)
+    *_, last = kelley(TWO_POLICIES.forward, expert, rng=RNG)
     np.testing.assert_allclose(last.mu, 0.5, atol=1e-9)
     assert last.certificate == pytest.approx(-0.1)
 
@@ -143,10 +148,10 @@ def test_kelley_ends_on_the_two_policy_problem_with_the_even_mixture():
 def test_lpal_says_that_it_needs_a_finite_world():
     problem = LQR(2)
     with pytest.raises(InvalidInputError, match="finitely many states"):
-        lpal(problem, problem.expert(np.array([0.5, 0.5]), np.random.default_rng(0)))
+        list(lpal(problem.forward, problem.expert(np.array([0.5, 0.5]), RNG), rng=RNG))
 
 
 def test_budgets_must_make_sense():
     expert = Expert(np.array([0.4, 0.4]), np.zeros(2))
     with pytest.raises(InvalidInputError, match="max_solves"):
-        list(kelley(TWO_POLICIES.forward, expert, max_solves=0))
+        list(kelley(TWO_POLICIES.forward, expert, rng=RNG, max_solves=0))

@@ -9,7 +9,8 @@ from walking_irl.domains.lqr import LQR
 from walking_irl.errors import InvalidInputError
 from walking_irl.geometry.centres import CENTRES
 from walking_irl.geometry.game import game_lp
-from walking_irl.geometry.polyhedron import WeightPolyhedron, plane_basis
+from walking_irl.geometry.plane import plane_basis
+from walking_irl.geometry.polyhedron import WeightPolyhedron
 
 
 @pytest.mark.parametrize("seed", range(4))

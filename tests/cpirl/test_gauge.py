@@ -45,7 +45,7 @@ def test_gauge_is_seen_in_policies_and_only_where_there_is_one():
 def test_macro_cells_are_not_matched_by_uniform_weights(seed):
     rng = np.random.default_rng(seed)
     domain = Gridworld(16, 3, "macro")
-    w_E = domain.random_weights(rng)
+    w_E = domain.random_weights("sparse", rng)
     expert = domain.expert(w_E, rng)
     run = list(cpirl(domain.forward, expert, rng=rng))
     assert run[-1].status is Status.MATCHED

@@ -7,12 +7,13 @@ from problems import TWO_POLICIES, Menu, without_sensitivity
 from scipy.optimize import minimize
 
 from walking_irl.cpirl.loop import cpirl
-from walking_irl.cpirl.newton import reduced
+from walking_irl.cpirl.probes import Probing
+from walking_irl.cpirl.regret_model import reduced
 from walking_irl.cpirl.summary import summarise
 from walking_irl.domains.lqr import LQR
 from walking_irl.errors import InvalidInputError
 from walking_irl.expert import expert_from_returns
-from walking_irl.geometry.polyhedron import plane_basis
+from walking_irl.geometry.plane import plane_basis
 from walking_irl.types import Expert, Rule, Status
 
 
@@ -179,7 +180,7 @@ def test_probes_tighten_intervals_around_the_truth_and_use_the_executor():
     expert = LQR(3).expert(w_E, rng)
     plain = list(cpirl(LQR(3).forward, expert, rng=rng))
     with ThreadPoolExecutor(2) as executor:
-        run = list(cpirl(LQR(3).forward, expert, rng=rng, probe=1e-4, executor=executor))
+        run = list(cpirl(LQR(3).forward, expert, rng=rng, probe=Probing(1e-4, executor)))
     probes = [i for i in run if i.rule is Rule.PROBE]
     assert len(probes) == 6
     assert [i.status for i in run[:-1]].count(Status.PROBE) == 5

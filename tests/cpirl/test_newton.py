@@ -8,10 +8,10 @@ from problems import without_sensitivity
 from scipy.optimize import minimize
 
 from walking_irl.cpirl.loop import cpirl
-from walking_irl.cpirl.newton import extremes, newton_step
+from walking_irl.cpirl.regret_model import extremes, newton_step
 from walking_irl.domains.lqr import LQR
 from walking_irl.errors import InvalidInputError
-from walking_irl.geometry.polyhedron import plane_basis
+from walking_irl.geometry.plane import plane_basis
 from walking_irl.types import Expert, Response, Status
 
 

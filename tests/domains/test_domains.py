@@ -4,21 +4,25 @@ import numpy as np
 import pytest
 from small_mdps import measure
 
-from walking_irl.domains.humanoid.closed_loop.trials import Protocol
+from walking_irl.domains.contract import Request
 from walking_irl.domains.humanoid.domain import Humanoid
 from walking_irl.domains.lqr import LQR
 from walking_irl.domains.mdp.driving import Driving
 from walking_irl.domains.mdp.gridworld import Gridworld
+from walking_irl.domains.mdp.objectworld import Objectworld
+from walking_irl.domains.mdp.random_mdp import RandomMDP
 from walking_irl.domains.path.walking_path import WalkingPath
 from walking_irl.errors import InvalidInputError
 
 MAKERS = {
     "gridworld": lambda: Gridworld(12, 3),
     "gridworld-macro": lambda: Gridworld(8, 2, "macro"),
+    "objectworld": lambda: Objectworld(12),
+    "random-mdp": RandomMDP,
     "driving": Driving,
     "lqr": lambda: LQR(3),
     "walking-path": lambda: WalkingPath([(3.0, 2.0, 90.0), (1.5, -2.5, -90.0)], n_intervals=12),
-    "humanoid-planar": lambda: Humanoid(planar=True),
+    "humanoid-planar": lambda: Humanoid("humanoid-planar"),
 }
 WALKER = pytest.param("humanoid-planar", marks=pytest.mark.slow)
 
@@ -88,7 +92,8 @@ def test_expert_is_at_least_as_good_as_any_answer(domain):
     rng = np.random.default_rng(4)
     w_E = weights(domain, 1, seed=4)[0]
     if isinstance(domain, Humanoid):  # a search among local optima admits a gap of its own
-        expert = domain.demonstrate(w_E, rng, Protocol(rollouts=0)).expert
+        request = Request(w_E, options={"rollouts": 0})
+        expert = domain.demonstrate(request, rng=rng).expert
         assert 0.0 < expert.suboptimality <= 1e-4 * np.abs(expert.mu).mean()
     else:
         expert = domain.expert(w_E, rng)

@@ -35,7 +35,7 @@ def test_coverage_set_has_the_four_published_vertices(world):
 def test_every_centre_ends_at_the_experts_return(world, centre):
     for seed in range(20):
         rng = np.random.default_rng(seed)
-        w_E = world.random_weights(rng)
+        w_E = world.random_weights("uniform", rng)
         expert = world.expert(w_E, rng)
         iterations = list(cpirl(world.forward, expert, centre=centre, rng=rng))
         assert len(iterations) <= 8

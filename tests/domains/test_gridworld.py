@@ -57,7 +57,7 @@ def test_analytic_centre_needs_few_solves_on_16_regions():
     solves = []
     for seed in range(20):
         rng = np.random.default_rng(seed)
-        w_E = world.random_weights(rng)
+        w_E = world.random_weights("sparse", rng)
         expert = world.expert(w_E, rng)
         for it in cpirl(world.forward, expert, rng=rng):
             assert (it.response.mu - expert.mu) @ w_E <= 1e-9
@@ -69,10 +69,10 @@ def test_analytic_centre_needs_few_solves_on_16_regions():
     assert np.mean(solves) <= 8
 
 
-def test_hidden_weights_are_sparse_with_at_least_two_non_zeros():
+def test_sparse_weights_exist_with_at_least_two_non_zeros():
     world = Gridworld(16, 4)
     for seed in range(20):
-        w = world.random_weights(np.random.default_rng(seed))
+        w = world.random_weights("sparse", np.random.default_rng(seed))
         assert w.sum() == pytest.approx(1.0)
         assert 2 <= np.count_nonzero(w) <= 15
 

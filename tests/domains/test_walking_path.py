@@ -81,7 +81,7 @@ def test_sensitivity_equals_differences_of_the_solver(world):
 
 def test_more_starts_find_nothing_better(world):
     rng = np.random.default_rng(2)
-    for w in [published_weights(), world.random_weights(rng)]:
+    for w in [published_weights(), world.random_weights("interior", rng)]:
         a = w / SCALES
         for i, path in enumerate(world.forward(w).policy):
             for _ in range(4):

@@ -145,13 +145,13 @@ def test_an_environment_without_features_is_refused(world):
 
 def test_costs_per_metre_of_the_walkers_agent_are_those_of_its_gait():
     """Two disturbed walks of four cycles, without the first two: as the gait to a few per cent."""
-    shipped = load_library(True)["reference"]
+    shipped = load_library("humanoid-planar")["reference"]
     limit = (4 * 80 + 1.5) * shipped.gait.timestep
-    env = WalkerEnv(planar=True, time_limit=limit)
+    env = WalkerEnv(body="humanoid-planar", time_limit=limit)
     episodes = collect(env, TrackingAgent.of(env), episodes=2, seed=0, key="costs")
     mu = per_metre(episodes, skip=2 * 80 + 1)
     assert mu.shape == (2, 6)
-    np.testing.assert_allclose(mu, np.tile(-shipped.folded, (2, 1)), rtol=0.05)
+    np.testing.assert_allclose(mu, np.tile(-shipped.total_costs, (2, 1)), rtol=0.05)
     with pytest.raises(InvalidInputError, match="makes no progress after the first 999"):
         per_metre(episodes, skip=999)
 

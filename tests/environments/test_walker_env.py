@@ -178,7 +178,7 @@ def test_the_vector_reward_with_a_price_is_the_scalar_one_but_for_the_time_term(
 
 def test_weights_are_a_tasks_name_or_six_numbers_of_any_sum(make):
     named = make(weights="time x3").unwrapped
-    own = make(weights=10 * load_library(True)["time x3"].w).unwrapped
+    own = make(weights=10 * load_library("humanoid-planar")["time x3"].w).unwrapped
     np.testing.assert_allclose(own.weights, named.weights)
     assert own.gait == named.gait and own.task.price == pytest.approx(named.task.price)
 
@@ -197,7 +197,7 @@ def test_nonsense_is_refused(settings, message):
     from walking_irl.environments.walker import WalkerEnv
 
     with pytest.raises(InvalidInputError, match=message):
-        WalkerEnv(planar=True, **settings)
+        WalkerEnv(body="humanoid-planar", **settings)
 
 
 def test_an_action_of_another_shape_is_refused(make):

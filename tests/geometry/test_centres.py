@@ -17,8 +17,9 @@ from walking_irl.geometry.centres import CENTRES, centre_rule
 from walking_irl.geometry.centres.chebyshev import chebyshev
 from walking_irl.geometry.centres.ellipsoid import cvxpy_ellipsoid, inscribed_ellipsoid
 from walking_irl.geometry.centres.gravity import gravity, hit_and_run
-from walking_irl.geometry.halfspaces import barrier_centre, whitened_rows
-from walking_irl.geometry.polyhedron import WeightPolyhedron, plane_basis
+from walking_irl.geometry.halfspaces import barrier_centre
+from walking_irl.geometry.plane import plane_basis
+from walking_irl.geometry.polyhedron import WeightPolyhedron
 
 
 def is_strictly_inside(P, centre):
@@ -140,7 +141,7 @@ def test_samples_have_the_moments_of_the_triangulated_set():
     for _ in range(3):
         P, _ = polyhedron_around(rng, 5, 8, 0.2)
         exact = gravity(P, rng=rng)
-        rows = whitened_rows(P.A, P.barrier, P.b)
+        rows = P.whitened.rows
         y = hit_and_run(rows, 20_000, rng)
         assert (y @ rows.T).max() < 1.0
         z = P.barrier.z + np.linalg.solve(P.barrier.R, y.T).T
@@ -178,7 +179,7 @@ def test_inscribed_ellipsoid_shrinks_by_tarasov_khachiyan_erlikh(K):
 @pytest.mark.parametrize("width", [0.3, 1e-6])
 def test_inscribed_ellipsoid_agrees_with_cvxpy(width):
     P, _ = polyhedron_around(np.random.default_rng(0), 4, 15, width)
-    rows = whitened_rows(P.A, P.barrier, P.b)
+    rows = P.whitened.rows
     ours, oracle = inscribed_ellipsoid(rows), cvxpy_ellipsoid(rows)
     np.testing.assert_allclose(ours.centre, oracle.centre, atol=1e-4)
     assert np.linalg.slogdet(ours.square)[1] == pytest.approx(

@@ -36,7 +36,7 @@ def test_optima_agree_with_highs_and_are_proven_by_their_multipliers(n):
 def test_optima_that_are_not_proven_come_from_highs(monkeypatch):
     C, A, b, corners = box_and_cuts(0, 5, 20)
     expected = maximise(C, A, b, corners)
-    monkeypatch.setattr(dual_simplex, "MOST_PIVOTS", 1)
+    monkeypatch.setattr(dual_simplex, "_MOST_PIVOTS", 1)
     asked = []
     highs = dual_simplex._highs
     monkeypatch.setattr(dual_simplex, "_highs", lambda *a: asked.append(0) or highs(*a))

@@ -7,6 +7,7 @@ from problems import polyhedron_around
 from walking_irl.errors import EmptyPolyhedronError, FlatPolyhedronError, InvalidInputError
 from walking_irl.geometry.centres.analytic import analytic
 from walking_irl.geometry.polyhedron import WeightPolyhedron
+from walking_irl.geometry.rows import pruned, with_relevant
 
 
 @pytest.mark.parametrize("K", [2, 3, 4, 5, 6, 7])
@@ -31,7 +32,7 @@ def test_intervals_agree_with_vertices_at_every_scale(K, width):
 
 def test_pruning_keeps_the_set():
     P, _ = polyhedron_around(np.random.default_rng(0), 5, 60, 0.2)
-    Q = P.pruned()
+    Q = pruned(P)
     assert len(Q.cuts) < len(P.cuts)
     assert Q.volume() == pytest.approx(P.volume(), rel=1e-9)
 
@@ -45,11 +46,11 @@ def test_a_large_relevance_proves_that_a_cut_is_implied(K):
         far -= far.mean(axis=1, keepdims=True)
         far /= np.linalg.norm(far, axis=1, keepdims=True)
         P = P.cut_all(far - (far @ w + np.geomspace(0.05, 0.9, 20))[:, None], np.ones(20, bool))
-        relevance, m = P.relevance(), len(P.barrier.slack)
+        relevance, m = P.whitened.relevance(), len(P.barrier.slack)
         implied = np.flatnonzero(relevance >= math.sqrt(m * (m - 1)))
-        assert not set(implied) & set(P.active_rows)
+        assert not set(implied) & set(P.whitened.active_rows())
         n_implied += len(implied)
-        in_barrier = P.relevance()[: K + 2]  # bounds and eager cuts
+        in_barrier = P.whitened.relevance()[: K + 2]  # bounds and eager cuts
         assert in_barrier.min() >= 1.0 - 1e-9
     assert n_implied > 0
 
@@ -58,14 +59,14 @@ def test_fewer_relevant_cuts_are_the_same_set_and_a_centre_inside_it():
     rng = np.random.default_rng(0)
     P, _ = polyhedron_around(rng, 5, 60, 0.2)
     for most in (0, 4, 12, 60):
-        Q = P.with_relevant(most)
+        Q = with_relevant(P, most)
         assert Q.volume() == pytest.approx(P.volume(), rel=1e-9)
         w = analytic(P, most=most).w
         assert P.contains(w, -1e-6), "strictly inside, though most cuts are ignored"
         assert 5 + most <= len(Q.barrier.slack) <= 65
     np.testing.assert_allclose(analytic(P, most=60).w, analytic(P).w, atol=1e-9)
     with pytest.raises(InvalidInputError, match="must not be negative"):
-        P.with_relevant(-1)
+        with_relevant(P, -1)
 
 
 def test_cuts_never_enlarge_the_volume():
@@ -106,3 +107,16 @@ def test_bad_input_is_named():
         WeightPolyhedron.simplex(4, 0.25)
     with pytest.raises(InvalidInputError, match="finite"):
         P.cut(np.array([np.nan, 0, 0, 0]))
+
+
+@pytest.mark.parametrize("K", [2, 4, 6])
+def test_whitened_set_holds_the_unit_ball_and_maps_back(K):
+    P, _ = polyhedron_around(np.random.default_rng(K), K, 12, 0.1)
+    W = P.whitened
+    assert W.relevance().min() >= 1.0 - 1e-9, "every row is eager: the Dikin ellipsoid is inside"
+    distance = (P.b - P.A @ W.centre.z) / np.linalg.norm(P.A @ np.linalg.inv(W.centre.R), axis=1)
+    np.testing.assert_allclose(W.relevance(), distance, rtol=1e-9)
+    y = W.vertices()
+    np.testing.assert_allclose((W.rows @ y.T).max(axis=0), 1.0, atol=1e-9)
+    z = W.to_plane(y)
+    np.testing.assert_allclose((z - W.centre.z) @ W.centre.R.T, y, atol=1e-9)

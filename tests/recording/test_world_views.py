@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,22 +12,21 @@ import pytest
 from walking_irl.arrays import Array
 from walking_irl.cpirl.loop import cpirl
 from walking_irl.domains import DOMAINS, load
-from walking_irl.domains.mdp.driving import Driving, DrivingPicture
 from walking_irl.recording import Experiment, Recorder, style
-from walking_irl.recording.drawing import outline
 from walking_irl.recording.reader import Recording, inspect_recording
 from walking_irl.recording.style import PLAYBACK_RATE
-from walking_irl.recording.views.driving import FRAMES_PER_STEP, LAST_STEPS, Road, headline, play
+from walking_irl.recording.views.driving import FRAMES_PER_STEP, LAST_STEPS, Road
 from walking_irl.recording.views.lqr import FRAMES_PER_STEP as LQR_FRAMES
 from walking_irl.recording.views.path import LAST_LONGEST, LAST_PACE, PACE
-from walking_irl.recording.views.registry import WORLDS, world_of
-from walking_irl.run.case import Case, Setup
-from walking_irl.run.preparation import prepare
+from walking_irl.recording.views.registry import VIEWS, World, world_of
+from walking_irl.run.problem import Problem, prepare
+from walking_irl.run.setup import Setup
 from walking_irl.types import Iteration
 
 MOST_FRAMES, MOST_BYTES = 130, 250_000
 """Of one iteration; a default run has up to 38."""
 N_GOALS, N_CELLS = 4, 16
+TOYS = ["gridworld", "lqr", "walking-path", "driving"]
 MOVING = {
     "lqr": ("/world/{}/now", "Points2D:positions"),
     "walking-path": ("/world/{}/people", "Ellipsoids3D:centers"),
@@ -51,7 +50,8 @@ class Shown:
     """A short run of a domain and its recording."""
 
     name: str
-    case: Case
+    problem: Problem
+    world: World
     iterations: list[Iteration]
     recording: Recording
 
@@ -62,7 +62,7 @@ class Shown:
         return [int(t) for t in column.times]
 
     def picture(self, policy: Any) -> Any:
-        return self.case.domain.picture(policy)
+        return self.problem.domain.picture(policy)
 
     def rows(self, who: str) -> tuple[Array, list[Array]]:
         entity, component = MOVING[self.name]
@@ -70,22 +70,25 @@ class Shown:
         return column.times, [np.array(row) for row in column.rows]
 
 
-@pytest.fixture(scope="module", params=list(WORLDS))
+@pytest.fixture(scope="module", params=TOYS)
 def shown(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Shown:
     return record(request.param, tmp_path_factory.mktemp(request.param) / "a.rrd")
 
 
 def record(name: str, path: Path) -> Shown:
-    case = prepare(Setup(domain=name, record=path), None)
+    problem = prepare(Setup(domain=name, record=path))
     rng = np.random.default_rng(0)
-    expert, w_expert = case.subject.expert, case.subject.w_expert
-    iterations = list(cpirl(case.forward, expert, max_solves=3, rng=rng))
-    experiment = Experiment(name, case.domain.objectives, expert, seed=0, w_expert=w_expert)
-    with Recorder(path, experiment, case.world) as recorder:
+    expert, truth = problem.expert, problem.demonstration.truth
+    assert truth is not None
+    iterations = list(cpirl(problem.learner.forward, expert, max_solves=3, rng=rng))
+    experiment = Experiment(name, problem.objectives, expert, seed=0, truth=truth)
+    world = world_of(problem.domain, problem.demonstration)
+    assert world is not None
+    with Recorder(path, experiment, world.view) as recorder:
         for it in iterations:
-            recorder.iteration(it, case.motion(it.response.policy, it.w))
-        recorder.finale(case.motion(expert.demonstration, w_expert))
-    return Shown(name, case, iterations, Recording(path))
+            recorder.iteration(it, world.motion(it.response.policy, it.w))
+        recorder.finale(world.motion(expert.demonstration, truth.w))
+    return Shown(name, problem, world, iterations, Recording(path))
 
 
 def only(*names: str) -> pytest.MarkDecorator:
@@ -93,24 +96,24 @@ def only(*names: str) -> pytest.MarkDecorator:
     return pytest.mark.parametrize("shown", names, indirect=True, scope="module")
 
 
-def test_every_small_domain_has_a_world() -> None:
-    assert set(WORLDS) == {name for name in DOMAINS if not name.startswith("humanoid")}
+def test_every_domain_of_the_registry_has_a_view() -> None:
+    assert {load(name).view for name in DOMAINS} == set(VIEWS)
 
 
 def test_the_world_is_in_the_recording(shown: Shown) -> None:
     entities = set(shown.recording.entities)
     assert {f"/world/{path}" for path in ENTITIES[shown.name]} <= entities
     assert shown.recording.has_blueprint
-    curves = shown.case.world.curves()
+    curves = shown.world.view.curves()
     assert curves and set(curves) <= entities
-    assert shown.case.world.describe() in shown.recording.summary
+    assert shown.world.view.describe() in shown.recording.summary
 
 
 def test_what_is_known_of_the_run_is_read_back(shown: Shown) -> None:
     found = inspect_recording(shown.recording.path)
     assert (found["domain"], found["iterations"]) == (shown.name, len(shown.iterations))
-    np.testing.assert_allclose(found["w_expert"], shown.case.subject.w_expert)
-    scales = np.array([o.scale for o in shown.case.domain.objectives])
+    np.testing.assert_allclose(found["w_expert"], shown.problem.w_expert)
+    scales = np.array([o.scale for o in shown.problem.domain.objectives])
     physical = shown.iterations[-1].intervals / scales[:, None]
     np.testing.assert_allclose(found["physical_intervals"], physical)
     assert ("per raw unit" in shown.recording.summary) == bool(np.any(scales != 1.0))
@@ -134,9 +137,10 @@ def test_worlds_that_move_have_a_row_in_every_frame(shown: Shown) -> None:
 
 
 def test_an_unknown_expert_is_left_out(shown: Shown, tmp_path: Path) -> None:
-    case = shown.case
-    view, motion = world_of(shown.name, case.domain)
-    experiment = Experiment(shown.name, case.domain.objectives, case.subject.expert)
+    world = world_of(shown.problem.domain)
+    assert world is not None
+    view, motion = world
+    experiment = Experiment(shown.name, shown.problem.objectives, shown.problem.expert)
     with Recorder(tmp_path / "a.rrd", experiment, view) as recorder:
         for it in shown.iterations[:1]:
             recorder.iteration(it, motion(it.response.policy, it.w))
@@ -158,12 +162,12 @@ def test_grid_shows_rewards_visits_and_actions(shown: Shown) -> None:
         cells = np.array(image).reshape(N_CELLS, N_CELLS, 3).astype(int)
         amount = np.where(picture.regions < 0, 0.0, it.w[picture.regions])
         assert np.all(cells[amount == 0.0] == style.PAPER)
-        below = amount < shown.case.subject.w_expert.max()  # beyond, the colour is full
+        below = amount < shown.problem.w_expert.max()  # beyond, the colour is full
         order = np.argsort(amount[below])
         assert np.all(np.diff(cells[below][order, 2]) <= 0)  # less blue: more amber
         drawn = np.array(arrows).reshape(N_CELLS, N_CELLS, 2)
         np.testing.assert_allclose(np.sign(drawn[..., ::-1]), picture.arrows)
-    expert = shown.picture(shown.case.subject.expert.demonstration)
+    expert = shown.picture(shown.problem.expert.demonstration)
     (seen,) = shown.recording.static("/world/expert/visits")["Image:buffer"]
     red = np.array(seen).reshape(N_CELLS, N_CELLS, 3).astype(int)
     assert np.unravel_index(red[..., 1].argmin(), red.shape[:2]) == np.unravel_index(
@@ -174,7 +178,7 @@ def test_grid_shows_rewards_visits_and_actions(shown: Shown) -> None:
 @only("gridworld")
 def test_grid_tells_where_learner_and_expert_differ(shown: Shown) -> None:
     agreement = np.ravel(shown.recording.column("/curves/agreement", "Scalars:scalars").rows)
-    pi = shown.case.subject.expert.demonstration
+    pi = shown.problem.expert.demonstration
     expected = [100 * np.mean(it.response.policy == pi) for it in shown.iterations]
     np.testing.assert_allclose(agreement, [*expected, 100.0])
     assert agreement[0] < 100.0
@@ -202,7 +206,7 @@ def test_lqr_charts_follow_the_closed_loop(shown: Shown) -> None:
 
 @only("walking-path")
 def test_people_walk_from_the_start_to_their_goals(shown: Shown) -> None:
-    goals = shown.case.domain.goals
+    goals = shown.problem.domain.goals
     turn = shown.recording.column("/world/learner/people", "Ellipsoids3D:quaternions").rows
     _, rows = shown.rows("learner")
     end = shown.starts[1] - 1
@@ -214,7 +218,7 @@ def test_people_walk_from_the_start_to_their_goals(shown: Shown) -> None:
         apart = 2 * np.arctan2(z, w) - poses[:, 2]
         np.testing.assert_allclose(np.cos(apart), 1.0, atol=1e-6)
     finale = inspect_recording(shown.recording.path)["frames"] - shown.starts[-1]
-    time = shown.picture(shown.case.subject.expert.demonstration).time
+    time = shown.picture(shown.problem.expert.demonstration).time
     longest = max(float(t[-1]) for t in time) * PLAYBACK_RATE
     assert finale > min(longest / LAST_PACE, LAST_LONGEST) > 2 * longest / PACE
 
@@ -247,46 +251,9 @@ def test_cars_are_where_the_drive_puts_them(shown: Shown) -> None:
         )
 
 
-def drive(domain: Driving, action: int) -> DrivingPicture:
-    """A drive that always takes one action: at the start it picks the speed."""
-    return domain.picture(np.full(domain.mdp.n_states, action), n_steps=30)
-
-
-def test_a_car_that_is_passed_is_followed_by_the_next_one() -> None:
-    picture = drive(Driving(), 1)
-    frames = play(Road(picture, 0.0), 29 * FRAMES_PER_STEP)
-    step = np.diff(frames.others[:, 0, 1])
-    forward = -0.1 * picture.advance[0] / FRAMES_PER_STEP
-    is_even = np.isclose(step, forward)
-    assert is_even.mean() > 0.9  # all but where the next car takes over
-    np.testing.assert_allclose(np.diff(frames.travelled), -forward)
-    takes_over = FRAMES_PER_STEP * (1 + np.flatnonzero(np.diff(picture.red[:, 1]) < 0))
-    assert takes_over.size and not is_even[takes_over - 1].any()
-    np.testing.assert_allclose(
-        frames.others[takes_over - 1, 1, 1] + forward, frames.others[takes_over, 0, 1]
-    )
-
-
-def test_collisions_and_leaving_the_road_are_the_features() -> None:
-    domain = Driving()
-    for action in range(3):
-        picture = drive(domain, action)
-        lacks = np.zeros((2, 30), dtype=bool)
-        for t in range(30):
-            dx, dy = np.abs(picture.blue[t] - picture.red[t])
-            lacks[:, t] = dx < 20 and dy < 40, abs(picture.blue[t, 0] - 160) > 20
-        np.testing.assert_array_equal(picture.is_colliding, lacks[0])
-        np.testing.assert_array_equal(picture.is_off_road, lacks[1])
-        hits, off = lacks.sum(axis=1)
-        speed = ("slow", "medium", "fast")[action]
-        assert headline("she", picture) == (
-            f"she: {speed}; of 30 steps {hits} collide, {off} leave the road"
-        )
-
-
 @only("driving")
 def test_colliding_cars_change_colour(shown: Shown) -> None:
-    picture = shown.picture(shown.case.subject.expert.demonstration)
+    picture = shown.picture(shown.problem.expert.demonstration)
     rows = shown.recording.column("/world/expert/car/body", "Boxes3D:colors").rows
     colours = np.ravel(rows[-LAST_STEPS * FRAMES_PER_STEP :])
     is_orange = colours >> 8 == int.from_bytes(bytes(style.FORCE), "big")
@@ -294,12 +261,10 @@ def test_colliding_cars_change_colour(shown: Shown) -> None:
     np.testing.assert_array_equal(is_orange[::FRAMES_PER_STEP], picture.is_colliding[:LAST_STEPS])
 
 
-def test_outlines_are_closed() -> None:
-    (ring,) = outline(np.array([[0.0, 1.0]]), np.array([[2.0, 4.0]]))
-    assert ring.tolist() == [[0, 1], [2, 1], [2, 4], [0, 4], [0, 1]]
+def test_a_domain_without_a_view_has_no_world() -> None:
+    assert world_of(replace(Plain(), view=None)) is None and world_of(Plain()) is None
 
 
-@pytest.mark.parametrize("name", list(WORLDS))
-def test_worlds_are_made_for_recordings_only(name: str) -> None:
-    assert prepare(Setup(domain=name, record=None), None).world is None
-    assert load(name).name  # a domain that makes pictures without a recorder
+@dataclass(frozen=True)
+class Plain:
+    view: str | None = "nobody registered this"

@@ -1,4 +1,4 @@
-"""Hidden weights of the walker are recovered, and the learner has no way to peek at them."""
+"""Ground-truth weights of the walker are recovered, and the learner has no way to peek at them."""
 
 import pickle
 from copy import copy
@@ -8,19 +8,21 @@ import numpy as np
 import pytest
 
 from walking_irl.run import session
-from walking_irl.run.case import Setup
-from walking_irl.run.session import run, workers
+from walking_irl.run.problem import pose
+from walking_irl.run.session import run
+from walking_irl.run.setup import Setup
 from walking_irl.types import Status
+from walking_irl.workers import workers
 
-PLANAR = Setup(domain="humanoid-planar", rollouts=0, seed=0)
+PLANAR = Setup(domain="humanoid-planar", options={"rollouts": 0}, seed=0)
 
 
 def recover(setup):
-    """Report of a run, and the case behind it."""
-    cases = []
+    """Report of a run, and the problem behind it."""
+    problems = []
     with workers() as executor:
-        report = run(setup, executor=executor, on_expert=cases.append)
-    return report, cases[0]
+        report = run(setup, executor=executor, on_expert=problems.append)
+    return report, problems[0]
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +32,7 @@ def planar():
 
 @pytest.fixture(scope="module")
 def recorded():
-    return recover(replace(PLANAR, rollouts=20))
+    return recover(replace(PLANAR, options={}))
 
 
 def assert_recovered(report, l1_error, solves):
@@ -61,12 +63,14 @@ def test_same_seed_gives_same_weights(planar):
     assert len(again.iterations) == len(planar[0].iterations)
 
 
-def test_other_hidden_weights_for_scoring_change_nothing_that_is_learnt(planar, monkeypatch):
-    report, case = planar
-    forward = case.domain.learner(case.subject.expert, case.forward.threads)
-    subject = replace(case.subject, w_expert=np.roll(case.subject.w_expert, 1))
-    other = replace(case, subject=subject, forward=forward)
-    monkeypatch.setattr(session, "prepare", lambda setup, executor: other)
+def test_other_weights_for_scoring_change_nothing_that_is_learnt(planar, monkeypatch):
+    report, problem = planar
+    shown = problem.demonstration
+    truth = replace(shown.truth, w=np.roll(shown.truth.w, 1))
+    other = replace(shown, truth=truth)
+    monkeypatch.setattr(
+        session, "prepare", lambda setup, executor, on_step: pose(setup, other, executor, on_step)
+    )
     again, _ = recover(PLANAR)
     assert not np.allclose(again.w_expert, report.w_expert) and again.l1_error > 0.1
     for a, b in zip(again.iterations, report.iterations, strict=True):
@@ -92,26 +96,28 @@ def holds(content, w):
 
 
 @pytest.mark.parametrize("knowledge", ["planar", "recorded"])
-def test_learner_never_sees_the_hidden_weights(knowledge, request):
-    _, case = request.getfixturevalue(knowledge)
-    given = {"expert": case.subject.expert, "forward": case.forward}
-    if case.measure is not None:
-        given["measure"] = copy(case.measure)
+def test_learner_never_sees_the_ground_truth_weights(knowledge, request):
+    _, problem = request.getfixturevalue(knowledge)
+    learner, w_E = problem.learner, problem.w_expert
+    given = {"expert": problem.expert, "forward": learner.forward}
+    if learner.measure is not None:
+        given["measure"] = copy(learner.measure)
         given["measure"].executor = None  # a process pool cannot be pickled, and knows nothing
-    peeking = pickle.dumps((case.subject.expert, case.subject.w_expert))
-    assert holds(peeking, case.subject.w_expert)  # the search finds what is there
+    peeking = pickle.dumps((problem.expert, w_E))
+    assert holds(peeking, w_E)  # the search finds what is there
     for name, part in given.items():
-        assert not holds(pickle.dumps(part), case.subject.w_expert), name
+        assert not holds(pickle.dumps(part), w_E), name
 
 
 def test_planar_walker_recovered_from_recorded_walks(recorded):
-    report, case = recorded
-    assert len(case.subject.trajectories) == 20 and case.subject.expert.covariance is not None
+    report, problem = recorded
+    shown = problem.demonstration
+    assert len(shown.trajectories) == 20 and shown.expert.covariance is not None
     assert_recovered(report, l1_error=0.005, solves=20)
 
 
 @pytest.mark.slow
 def test_spatial_walker_recovered_exactly():
-    report, _ = recover(Setup(rollouts=0, seed=100))
+    report, _ = recover(Setup(options={"rollouts": 0}, seed=100))
     assert_recovered(report, l1_error=0.005, solves=16)
     assert_never_cut(report)

@@ -1,20 +1,20 @@
-"""A run that was cut short goes on as if it had not been; every figure comes from its archive."""
+"""A run that was cut short goes on as if it had not been; all figures come from its checkpoint."""
 
 import json
 
 import numpy as np
 import pytest
 
-from walking_irl.cli import recover
+from walking_irl.cli import terminal
 from walking_irl.cli.main import main
-from walking_irl.domains import DOMAINS
+from walking_irl.domains import DOMAINS, WALKERS
 from walking_irl.errors import InvalidInputError
 from walking_irl.recording.reader import inspect_recording
-from walking_irl.run.case import Setup
-from walking_irl.run.checkpoint import Remembering, SavedRun, load_run, save_run
-from walking_irl.run.preparation import prepare
+from walking_irl.run.checkpoint import Checkpoint, Replay, load_checkpoint, save_checkpoint
+from walking_irl.run.problem import prepare
+from walking_irl.run.setup import Setup
 
-SMALL = [name for name in DOMAINS if not name.startswith("humanoid")]
+TOYS = [name for name in DOMAINS if name not in WALKERS]
 
 
 @pytest.fixture
@@ -32,7 +32,7 @@ def call(capsys, tmp_path, monkeypatch):
 def results(path):
     """All figures of a run, but clocks and file names."""
     content = json.loads(path.read_text())
-    for name in ("seconds", "recording", "archive"):
+    for name in ("seconds", "recording", "checkpoint"):
         del content[name]
     return content
 
@@ -42,7 +42,7 @@ def same_after_resuming(call, folder, *argv, code=0):
     assert call(*argv, "--max-solves", 1, "--record", "short.rrd", "--json", "short.json")[0] == 1
     assert len(results(folder / "short.json")["history"]) == 1
     got, out, err = call(
-        *("--resume", "short.archive.npz", "--max-solves", 20),
+        *("--resume", "short.checkpoint.npz", "--max-solves", 100),
         *("--record", "resumed.rrd", "--json", "resumed.json"),
     )
     assert got == code and not err and "1 known from before" in out
@@ -52,7 +52,7 @@ def same_after_resuming(call, folder, *argv, code=0):
         assert whole[key] == resumed[key], key
 
 
-@pytest.mark.parametrize("domain", SMALL)
+@pytest.mark.parametrize("domain", TOYS)
 def test_a_resumed_run_is_the_whole_run(call, tmp_path, domain):
     same_after_resuming(call, tmp_path, "--domain", domain)
 
@@ -67,46 +67,46 @@ def test_a_recorded_walker_is_resumed(call, tmp_path):
     same_after_resuming(call, tmp_path, "--domain", "humanoid-planar", "--rollouts", 5)
 
 
-def test_the_archive_is_whole_after_every_solve(call, tmp_path, monkeypatch):
+def test_the_checkpoint_is_whole_after_every_solve(call, tmp_path, monkeypatch):
     known = []
 
     def look(it, report):
-        known.append(len(load_run(tmp_path / "walking.archive.npz").answers))
+        known.append(len(load_checkpoint(tmp_path / "walking.checkpoint.npz").answers))
         if len(known) == 4:
             raise KeyboardInterrupt
         return "line"
 
-    monkeypatch.setattr(recover, "progress_line", look)
+    monkeypatch.setattr(terminal, "progress_line", look)
     code, out, _ = call("--domain", "lqr")
     assert code == 130 and known == [1, 2, 3, 4]
-    assert "recover --resume walking.archive.npz" in out
+    assert "recover --resume walking.checkpoint.npz" in out
 
 
 def test_known_answers_are_not_solved_again():
-    case = prepare(Setup(domain="lqr"), None)
     w = np.full(3, 1 / 3)
-    known = case.forward(w)
+    known = prepare(Setup(domain="lqr")).learner.forward(w)
 
     def fail(w):
         raise AssertionError("solved again")
 
-    forward = Remembering(fail, [(w, known)])
+    forward = Replay(fail, [(w, known)])
     assert forward(w + 1e-12) is known
     with pytest.raises(AssertionError):
         forward(np.array([0.5, 0.25, 0.25]))
 
 
-@pytest.mark.parametrize("domain", SMALL)
+@pytest.mark.parametrize("domain", TOYS)
 def test_a_run_survives_the_disk(tmp_path, domain):
     setup = Setup(domain=domain, weights=None, max_solves=7)
-    case = prepare(setup, None)
-    w = np.full(len(case.domain.objectives), 1 / len(case.domain.objectives))
-    response = case.forward(w)
-    save_run(tmp_path / "a.npz", SavedRun(setup, case.subject, [(w, response)]))
-    again = load_run(tmp_path / "a.npz")
+    problem = prepare(setup)
+    shown, K = problem.demonstration, len(problem.objectives)
+    w = np.full(K, 1 / K)
+    response = problem.learner.forward(w)
+    save_checkpoint(tmp_path / "a.npz", Checkpoint(setup, shown, [(w, response)]))
+    again = load_checkpoint(tmp_path / "a.npz")
     assert again.setup == setup
-    assert np.array_equal(again.subject.expert.mu, case.subject.expert.mu)
-    assert np.array_equal(again.subject.w_expert, case.subject.w_expert)
+    assert np.array_equal(again.demonstration.expert.mu, shown.expert.mu)
+    assert np.array_equal(again.demonstration.truth.w, problem.w_expert)
     [(asked, answer)] = again.answers
     assert np.array_equal(asked, w) and np.array_equal(answer.mu, response.mu)
     assert answer.info == dict(response.info)
@@ -114,7 +114,7 @@ def test_a_run_survives_the_disk(tmp_path, domain):
         assert answer.sensitivity is None
     else:
         assert np.array_equal(answer.sensitivity, response.sensitivity)
-    pack = case.domain.pack
+    pack = problem.domain.pack
     assert np.array_equal(pack(answer.policy), pack(response.policy))
 
 
@@ -122,9 +122,9 @@ def test_a_run_survives_the_disk(tmp_path, domain):
 
 
 @pytest.fixture
-def archive(call, tmp_path):
+def checkpoint(call, tmp_path):
     call("--domain", "lqr", "--max-solves", 2)
-    return tmp_path / "walking.archive.npz"
+    return tmp_path / "walking.checkpoint.npz"
 
 
 def complaint(call, *argv):
@@ -133,23 +133,23 @@ def complaint(call, *argv):
     return err
 
 
-def test_a_missing_archive(call):
+def test_a_missing_checkpoint(call):
     assert "no file none.npz" in complaint(call, "--resume", "none.npz")
 
 
-@pytest.mark.parametrize("content", [b"", b"no archive", b"PK\x03\x04" + bytes(40)])
-def test_an_unreadable_archive(call, tmp_path, content):
+@pytest.mark.parametrize("content", [b"", b"no checkpoint", b"PK\x03\x04" + bytes(40)])
+def test_an_unreadable_checkpoint(call, tmp_path, content):
     (tmp_path / "bad.npz").write_bytes(content)
     assert "not a readable run" in complaint(call, "--resume", "bad.npz")
 
 
-def test_half_an_archive(call, archive, tmp_path):
-    content = archive.read_bytes()
+def test_half_a_checkpoint(call, checkpoint, tmp_path):
+    content = checkpoint.read_bytes()
     (tmp_path / "half.npz").write_bytes(content[: len(content) // 2])
     assert "half.npz" in complaint(call, "--resume", "half.npz")
 
 
-def test_another_kind_of_archive(call, tmp_path):
+def test_another_kind_of_file(call, tmp_path):
     np.savez(tmp_path / "other.npz", time=np.arange(3.0))
     assert "cannot" not in complaint(call, "--resume", "other.npz")
 
@@ -163,26 +163,28 @@ def test_another_kind_of_archive(call, tmp_path):
         ("about", np.array("no JSON")),
     ],
 )
-def test_a_changed_archive(archive, name, value):
-    with np.load(archive) as data:
+def test_a_changed_checkpoint(checkpoint, name, value):
+    with np.load(checkpoint) as data:
         content = {**data, name: value}
-    np.savez(archive, **content)
+    np.savez(checkpoint, **content)
     with pytest.raises(InvalidInputError, match="can resume"):
-        load_run(archive)
+        load_checkpoint(checkpoint)
 
 
 @pytest.mark.parametrize(
     "option", [("--seed", 1), ("--centre", "cc"), ("--domain", "lqr"), ("--rollouts", 3)]
 )
-def test_a_resumed_run_takes_no_other_settings(call, archive, option):
-    assert option[0] in complaint(call, "--resume", archive, *option)
+def test_a_resumed_run_takes_no_other_settings(call, checkpoint, option):
+    assert option[0] in complaint(call, "--resume", checkpoint, *option)
 
 
 def test_a_resumed_run_keeps_its_answers_where_it_was_told(call, tmp_path):
-    assert call("--domain", "lqr", "--max-solves", 3, "--no-record", "--archive", "a.npz")[0] == 1
-    resumed = ("--resume", "a.npz", "--archive", "b.npz", "--max-solves", 1, "--no-record")
+    assert (
+        call("--domain", "lqr", "--max-solves", 3, "--no-record", "--checkpoint", "a.npz")[0] == 1
+    )
+    resumed = ("--resume", "a.npz", "--checkpoint", "b.npz", "--max-solves", 1, "--no-record")
     assert "--resume b.npz" in call(*resumed)[1]
-    first, second = load_run(tmp_path / "a.npz"), load_run(tmp_path / "b.npz")
+    first, second = load_checkpoint(tmp_path / "a.npz"), load_checkpoint(tmp_path / "b.npz")
     assert len(first.answers) == len(second.answers) == 3
 
 
@@ -195,10 +197,29 @@ def test_a_resumed_run_keeps_its_answers_where_it_was_told(call, tmp_path):
         ("sensitivity_0", np.full((3, 3), np.nan)),
     ],
 )
-def test_archives_with_other_arrays_are_named(call, tmp_path, name, value):
-    assert call("--domain", "lqr", "--max-solves", 3, "--no-record", "--archive", "a.npz")[0] == 1
+def test_checkpoints_with_other_arrays_are_named(call, tmp_path, name, value):
+    assert (
+        call("--domain", "lqr", "--max-solves", 3, "--no-record", "--checkpoint", "a.npz")[0] == 1
+    )
     with np.load(tmp_path / "a.npz") as data:
         arrays = {**data, name: value}
     np.savez(tmp_path / "b.npz", **arrays)
     code, _, err = call("--resume", "b.npz", "--no-record")
     assert code == 2 and "not a run that this version can resume" in err
+
+
+def test_checkpoints_of_the_first_format_are_resumed(call, tmp_path):
+    """Their settings had every domain's recording options, and no place for a domain's own."""
+    assert (
+        call("--domain", "lqr", "--max-solves", 3, "--no-record", "--checkpoint", "a.npz")[0] == 1
+    )
+    with np.load(tmp_path / "a.npz") as data:
+        arrays = dict(data)
+    about = json.loads(str(arrays["about"]))
+    del about["setup"]["options"]
+    old = {"population": "typical", "rollouts": 20, "noise": 0.02, "disturbance": "initial"}
+    about |= {"format": 1, "setup": about["setup"] | old}
+    np.savez(tmp_path / "old.npz", **{**arrays, "about": np.array(json.dumps(about))})
+    assert load_checkpoint(tmp_path / "old.npz").setup.options == {}
+    code, out, err = call("--resume", "old.npz", "--max-solves", 20, "--no-record")
+    assert code == 0 and not err and "3 known from before" in out

@@ -1,4 +1,4 @@
-"""What every rival holds after a forward solve: policies, and a lottery over them."""
+"""What every baseline holds after a forward solve: policies, and a lottery over them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import numpy as np
 from scipy.optimize import nnls
 
 from walking_irl.arrays import Array
-from walking_irl.errors import InvalidInputError
 from walking_irl.geometry.game import game_lp
 from walking_irl.rl.finite_mdp import FiniteMDP
 from walking_irl.types import Response, Status
@@ -80,15 +79,3 @@ def closest_mixture(M: Array, mu_E: Array, *, is_signed: bool = True) -> Array:
     share = nnls(A, np.r_[np.zeros(len(mu_E)), 1.0])[0][: len(M)]
     mixture: Array = share / share.sum()
     return mixture
-
-
-def checked_budget(max_solves: int, tol: float) -> None:
-    """Complain about a budget or a tolerance that makes no sense.
-
-    Raises:
-        InvalidInputError: If the budget is below 1 or the tolerance is negative.
-    """
-    if max_solves < 1 or not tol >= 0:
-        raise InvalidInputError(
-            f"max_solves must be at least 1 and tol >= 0, got {max_solves} and {tol}"
-        )

@@ -7,8 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from walking_irl.arrays import Array
-from walking_irl.baselines.apprentice import Apprentice, checked_budget, closest_mixture
-from walking_irl.types import Expert, Forward, Response, Status
+from walking_irl.baselines.apprentice import Apprentice, closest_mixture
+from walking_irl.baselines.loop import USUAL, Move, Setting, apprentices
+from walking_irl.baselines.projection import towards
+from walking_irl.types import Expert, Forward
 
 
 def max_margin(
@@ -16,41 +18,24 @@ def max_margin(
     expert: Expert,
     *,
     rng: np.random.Generator,
+    setting: Setting = USUAL,
     tol: float = 1e-6,
     max_solves: int = 60,
-    is_signed: bool = True,
 ) -> Iterator[Apprentice]:
     """Ask for the weights under which the expert beats all policies found by the widest margin.
 
     max t subject to w.mu_E >= w.mu_j + t for all j, |w|_2 <= 1. Its dual is the mixing program:
-    the optimal w points from the closest mixture to the expert, and t is their distance.
-
-    Args:
-        forward: Best policy for weights; must take negative ones where ``is_signed``.
-        expert: The expert; only ``mu`` is used.
-        rng: Draws the first weights (the original draws a first policy).
-        tol: Margin that counts as none, relative to |mu_E|_2.
-        max_solves: Budget of forward solves.
-        is_signed: Whether weights may be negative, as in the original; else w >= 0 is added.
-
-    Yields:
-        One apprentice per forward solve; the last has a status other than CUT.
+    the optimal w points from the closest mixture to the expert, and t is their distance; it ends
+    where t <= tol |mu_E|_2. The first weights are drawn (the original draws a first policy).
+    Without ``setting.is_signed``, w >= 0 is added. Arguments: see :class:`~.loop.Baseline`.
     """
-    checked_budget(max_solves, tol)
-    w = rng.dirichlet(np.ones(len(expert.mu)))
-    W: list[Array] = []
-    responses: list[Response] = []
-    for _ in range(max_solves):
-        W.append(w)
-        responses.append(forward(w))
-        M = np.array([r.mu for r in responses])
+    is_signed = setting.is_signed
+
+    def rule(W: Array, M: Array) -> Move:
         mixture = closest_mixture(M, expert.mu, is_signed=is_signed)
         gap = expert.mu - mixture @ M
         gap = gap if is_signed else np.maximum(gap, 0.0)
-        is_close = np.linalg.norm(gap) <= tol * np.linalg.norm(expert.mu)
-        is_last = len(W) == max_solves
-        status = Status.MATCHED if is_close else Status.BUDGET if is_last else Status.CUT
-        yield Apprentice(np.array(W), tuple(responses), mixture, expert.mu, status)
-        if is_close:
-            return
-        w = gap / np.abs(gap).sum()
+        return towards(gap, mixture, tol * float(np.linalg.norm(expert.mu)))
+
+    first = rng.dirichlet(np.ones(len(expert.mu)))
+    return apprentices(forward, expert, first, rule, tol=tol, max_solves=max_solves)

@@ -7,8 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from walking_irl.arrays import Array
-from walking_irl.baselines.apprentice import Apprentice, checked_budget, closest_mixture
-from walking_irl.types import Expert, Forward, Response, Status
+from walking_irl.baselines.apprentice import Apprentice, closest_mixture
+from walking_irl.baselines.loop import USUAL, Move, Setting, apprentices
+from walking_irl.types import Expert, Forward, Status
 
 
 def projection(
@@ -16,51 +17,40 @@ def projection(
     expert: Expert,
     *,
     rng: np.random.Generator,
+    setting: Setting = USUAL,
     tol: float = 1e-6,
     max_solves: int = 60,
-    is_signed: bool = True,
 ) -> Iterator[Apprentice]:
     """Move a point of the hull of the policies towards the expert, one line at a time.
 
     mu_bar_i = mu_bar_{i-1} + ((d.(mu_E - mu_bar_{i-1})) / d.d) d with d = mu_i - mu_bar_{i-1}, and
     w_{i+1} = mu_E - mu_bar_i. The step is kept within [0, 1], so that mu_bar stays in the hull.
     Queries are scaled to sum |w| = 1. The answer is the mixture of all policies found that is
-    closest to the expert (their section 3, a quadratic program), not mu_bar, which is farther.
-
-    Args:
-        forward: Best policy for weights; must take negative ones where ``is_signed``.
-        expert: The expert; only ``mu`` is used.
-        rng: Draws the first weights (the original draws a first policy).
-        tol: Distance |mu_E - mu_bar|_2 at which it stops, relative to |mu_E|_2.
-        max_solves: Budget of forward solves.
-        is_signed: Whether weights may be negative, as in the original. Else only the positive part
-            of mu_E - mu_bar counts, for domains whose solver needs w >= 0.
-
-    Yields:
-        One apprentice per forward solve; the last has a status other than CUT.
+    closest to the expert (their section 3, a quadratic program), not mu_bar, which is farther. It
+    ends where |mu_E - mu_bar|_2 <= tol |mu_E|_2. The first weights are drawn (the original draws a
+    first policy). Without ``setting.is_signed`` only the positive part of mu_E - mu_bar counts, for
+    domains whose solver needs w >= 0. Arguments: see :class:`~.loop.Baseline`.
     """
-    checked_budget(max_solves, tol)
-    w = rng.dirichlet(np.ones(len(expert.mu)))
-    W: list[Array] = []
-    responses: list[Response] = []
+    is_signed = setting.is_signed
     point = expert.mu
-    for _ in range(max_solves):
-        W.append(w)
-        responses.append(forward(w))
-        mu = responses[-1].mu
-        d, gap = mu - point, expert.mu - point
-        point = mu if len(W) == 1 else point + _step(d, gap, is_signed) * d
-        mixture = closest_mixture(
-            np.array([r.mu for r in responses]), expert.mu, is_signed=is_signed
-        )
+
+    def rule(W: Array, M: Array) -> Move:
+        nonlocal point
+        d, gap = M[-1] - point, expert.mu - point
+        point = M[-1] if len(M) == 1 else point + _step(d, gap, is_signed) * d
+        mixture = closest_mixture(M, expert.mu, is_signed=is_signed)
         gap = expert.mu - point if is_signed else np.maximum(expert.mu - point, 0.0)
-        is_close = np.linalg.norm(gap) <= tol * np.linalg.norm(expert.mu)
-        is_last = len(W) == max_solves
-        status = Status.MATCHED if is_close else Status.BUDGET if is_last else Status.CUT
-        yield Apprentice(np.array(W), tuple(responses), mixture, expert.mu, status)
-        if is_close:
-            return
-        w = gap / np.abs(gap).sum()
+        return towards(gap, mixture, tol * float(np.linalg.norm(expert.mu)))
+
+    first = rng.dirichlet(np.ones(len(expert.mu)))
+    return apprentices(forward, expert, first, rule, tol=tol, max_solves=max_solves)
+
+
+def towards(gap: Array, mixture: Array, least: float) -> Move:
+    """Ask for weights along the gap to the expert, or be content where it is small, shape (K,)."""
+    if np.linalg.norm(gap) <= least:
+        return Move(mixture, gap, Status.MATCHED)
+    return Move(mixture, gap / np.abs(gap).sum())
 
 
 def _step(d: Array, gap: Array, is_signed: bool) -> float:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import io
 from pathlib import Path
 from typing import Any
 
@@ -13,31 +12,49 @@ from rich.table import Table
 
 from walking_irl.arrays import Array
 from walking_irl.cli.weights import parse_weights, show_weights
-from walking_irl.domains import load
+from walking_irl.domains import WALKERS, load_walker_domain
+from walking_irl.domains.weights import normalised
 from walking_irl.errors import InvalidInputError
-from walking_irl.files import check_ending, check_outputs, write_file
-from walking_irl.run.report import write_json
-from walking_irl.run.session import workers
+from walking_irl.files import check_ending, check_outputs, write_file, write_json, write_png
+from walking_irl.workers import workers
+
+
+def add_parser(commands: Any) -> argparse.ArgumentParser:
+    """The command's parser."""
+    p: argparse.ArgumentParser = commands.add_parser(
+        "gait", help="solve for the best gait under given weights"
+    )
+    p.add_argument("--domain", default=WALKERS[0], help=f"{' or '.join(WALKERS)} (%(default)s)")
+    p.add_argument("--weights", required=True, metavar="W1,W2,...", help="one per objective")
+    p.add_argument(
+        "--seconds",
+        type=float,
+        default=10.0,
+        help="length of the closed-loop rollout (%(default)s)",
+    )
+    p.add_argument("--save", type=Path, metavar="FILE.npz|FILE.csv", help="write the gait cycle")
+    p.add_argument("--record", type=Path, metavar="FILE.rrd", help="record the rollout")
+    p.add_argument("--png", type=Path, metavar="FILE.png", help="draw a picture strip")
+    p.add_argument("--plot", type=Path, metavar="FILE.svg", help="draw its curves on the norms")
+    p.add_argument("--json", type=Path, metavar="FILE.json", help="write the gait's figures")
+    p.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    return p
 
 
 def run(args: argparse.Namespace, console: Console) -> int:
     """``walking-irl gait``."""
-    from walking_irl.domains.humanoid.domain import Humanoid
     from walking_irl.domains.humanoid.gait.files import save_gait
     from walking_irl.domains.humanoid.gait.realism import figures
-    from walking_irl.domains.humanoid.learner import check_weights
 
     check_ending(args.save, ".npz", ".csv")
     check_ending(args.record, ".rrd")
     check_ending(args.png, ".png")
-    check_outputs([args.save, args.record, args.png, args.json])
+    check_ending(args.plot, ".svg")
+    check_outputs([args.save, args.record, args.png, args.plot, args.json])
     if not (np.isfinite(args.seconds) and args.seconds > 0):
         raise InvalidInputError(f"seconds must be a positive number, got {args.seconds}")
-    domain = load(args.domain)
-    if not isinstance(domain, Humanoid):
-        raise InvalidInputError(f"gait needs humanoid or humanoid-planar, got {args.domain!r}")
-    given = parse_weights(args.weights)
-    w = check_weights(np.array(given))
+    domain = load_walker_domain(args.domain)
+    w = normalised(parse_weights(args.weights), domain.objectives)
     if not args.quiet:
         show_weights(w, console)
     with workers() as executor:
@@ -55,7 +72,9 @@ def run(args: argparse.Namespace, console: Console) -> int:
     if args.png is not None:
         from walking_irl.domains.humanoid.gait.pictures import strip
 
-        write_file(args.png, png(strip(domain.walker, found)))
+        write_png(args.png, strip(domain.walker, found))
+    if args.plot is not None:
+        write_file(args.plot, _curves(domain.walker, found).encode())
     if args.record is not None:
         _record_walk(args.record, domain, found, args.seconds, w)
     if args.json is not None:
@@ -65,13 +84,17 @@ def run(args: argparse.Namespace, console: Console) -> int:
     return 0
 
 
-def png(picture: Any) -> bytes:
-    """A picture (height, width, 3) as the content of a PNG file."""
-    from PIL import Image
+def _curves(walker: Any, found: Any) -> str:
+    """The gait's curves on the band of adults."""
+    from walking_irl.domains.humanoid.gait.curve_picture import curves_picture
+    from walking_irl.domains.humanoid.gait.curves import gait_curves
+    from walking_irl.domains.humanoid.gait.norm_curves import norm_set
+    from walking_irl.domains.humanoid.gait.realism import gait_cycle, leg_length
 
-    content = io.BytesIO()
-    Image.fromarray(picture).save(content, format="PNG", optimize=True)
-    return content.getvalue()
+    walks = {f"gait, {found.speed:.2f} m/s": gait_curves(gait_cycle(walker, found))}
+    norms = norm_set("adults", found.speed, leg_length(walker))
+    note = "adults at self-selected speed, mean and 1 s.d."
+    return curves_picture(f"Best gait of the {walker.name}", walks, norms, note)
 
 
 def _record_walk(path: Path, domain: Any, found: Any, seconds: float, w: Array) -> None:
@@ -103,4 +126,12 @@ def _show_gait(content: dict[str, Any], console: Console) -> None:
         table.add_row(name.replace("_", " "), f"{content[name]:.4g} {unit}")
     for name, value in zip(content["objectives"], content["mu"], strict=True):
         table.add_row(f"mu {name}", f"{value:.5f}")
+    for group, value in content["groups"].items():
+        table.add_row(f"realism: {group.replace('_', ' ')}", f"{value:.3f}")
+    met = content["bands"]
+    table.add_row("bands met", f"{sum(met.values())} of {len(met)}")
+    for name, norm in content["norms"].items():
+        table.add_row(f"within 1 s.d. of {name}", f"{100 * norm['mean']:.0f} % of the cycle")
+        for curve, share in norm["curves"].items():
+            table.add_row(f"  {curve.replace('_', ' ')}", f"{100 * share:.0f} %")
     console.print(table)

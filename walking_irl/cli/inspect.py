@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
@@ -10,8 +11,15 @@ from rich.markup import escape
 from rich.table import Table
 
 from walking_irl.cpirl.summary import per_unit
-from walking_irl.files import check_outputs
-from walking_irl.run.report import write_json
+from walking_irl.files import check_outputs, write_json
+
+
+def add_parser(commands: Any) -> argparse.ArgumentParser:
+    """The command's parser."""
+    p: argparse.ArgumentParser = commands.add_parser("inspect", help="print what a recording holds")
+    p.add_argument("file", type=Path, metavar="FILE.rrd")
+    p.add_argument("--json", type=Path, metavar="FILE.json", help="write it as JSON, too")
+    return p
 
 
 def run(args: argparse.Namespace, console: Console) -> int:
@@ -38,12 +46,12 @@ def run(args: argparse.Namespace, console: Console) -> int:
 
 
 def _table_of_recording(content: dict[str, Any]) -> Table:
-    table = Table("objective", "hidden", "recovered", "interval", "per raw unit")
-    hidden, found, bounds = content["w_expert"], content["w"], content["intervals"]
+    table = Table("objective", "ground truth", "recovered", "interval", "per raw unit")
+    truth, found, bounds = content["w_expert"], content["w"], content["intervals"]
     for j, name in enumerate(content["objectives"] or []):
         table.add_row(
             str(name),
-            "unknown" if hidden is None else f"{hidden[j]:.4f}",
+            "unknown" if truth is None else f"{truth[j]:.4f}",
             "-" if found is None else f"{found[j]:.4f}",
             "-" if bounds is None else f"{bounds[j][0]:.4f} .. {bounds[j][1]:.4f}",
             "-"

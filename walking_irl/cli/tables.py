@@ -3,12 +3,26 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
 
 from walking_irl.cli import DONE, INTERRUPTED
-from walking_irl.run.session import workers
+from walking_irl.workers import workers
+
+
+def add_parser(commands: Any) -> argparse.ArgumentParser:
+    """The command's parser."""
+    p: argparse.ArgumentParser = commands.add_parser(
+        "tables", help="regenerate the thesis's tables and two more"
+    )
+    p.add_argument("names", nargs="+", metavar="TABLE", help="7.1 ... 7.12, fig7.1, or all")
+    p.add_argument("--seeds", type=int, help="experts per cell")
+    p.add_argument("--out", type=Path, default=Path("tables"), help="folder (%(default)s)")
+    p.add_argument("--quiet", action="store_true", help="print the files' names only")
+    return p
 
 
 def run(args: argparse.Namespace, console: Console) -> int:

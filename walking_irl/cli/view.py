@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
@@ -14,6 +16,22 @@ from walking_irl.errors import InvalidInputError
 from walking_irl.files import check_ending, check_outputs
 
 SCREENS = ("DISPLAY", "WAYLAND_DISPLAY")
+
+
+def add_parser(commands: Any) -> argparse.ArgumentParser:
+    """The command's parser."""
+    p: argparse.ArgumentParser = commands.add_parser(
+        "view", help="open a recording in the viewer, or render it to a picture"
+    )
+    p.add_argument("file", type=Path, metavar="FILE.rrd")
+    p.add_argument(
+        "--png", type=Path, metavar="FILE.png", help="render a picture without a screen instead"
+    )
+    p.add_argument(
+        "--web", action="store_true", help="serve it to a browser on this machine, until Ctrl-C"
+    )
+    p.add_argument("--frame", type=int, help="frame to render (default: the last)")
+    return p
 
 
 def run(args: argparse.Namespace, console: Console) -> int:

@@ -16,7 +16,8 @@ from walking_irl.arrays import Array
 from walking_irl.errors import InvalidInputError
 from walking_irl.geometry.centres.centre import Centre
 from walking_irl.geometry.game import finite_rows
-from walking_irl.geometry.polyhedron import WeightPolyhedron, plane_basis
+from walking_irl.geometry.plane import plane_basis
+from walking_irl.geometry.polyhedron import WeightPolyhedron
 
 
 def single_policy_bounds(P: WeightPolyhedron, D: Array) -> Array:
@@ -125,9 +126,9 @@ def volume_bound(D: Array, volume_ratio: float) -> float:
     return float(max(D.max(), 0.0) * alpha / (1.0 - alpha))
 
 
-GRAVITY_RATE = -math.log(1.0 - 1.0 / math.e)
+_GRAVITY_RATE = -math.log(1.0 - 1.0 / math.e)
 """Volume lost per cut through the centre of gravity, in nats (Gruenbaum)."""
-ELLIPSOID_RATE = -math.log(0.843)
+_ELLIPSOID_RATE = -math.log(0.843)
 """The same for the largest inscribed *ellipsoid* (not the polyhedron) and its centre."""
 
 
@@ -143,7 +144,7 @@ def iteration_bound(n_objectives: int, accuracy: float, centre: str = "cg") -> f
     Raises:
         InvalidInputError: If the centre has no such bound, or the accuracy is not in (0, 1).
     """
-    rates = {"cg": GRAVITY_RATE, "mvie": ELLIPSOID_RATE}
+    rates = {"cg": _GRAVITY_RATE, "mvie": _ELLIPSOID_RATE}
     if centre not in (*rates, "ac"):
         raise InvalidInputError(
             f"no iteration bound for centre {centre!r}; choose from ac, cg, mvie"
@@ -174,7 +175,7 @@ def level_bound(n_objectives: int, accuracy: float) -> float:
     """Theorem A3: cuts through centres of gravity until f(w_k) <= accuracy max_j f(e_j)."""
     if not 0.0 < accuracy < 1.0:
         raise InvalidInputError(f"accuracy must lie in (0, 1), got {accuracy}")
-    return (n_objectives - 1) * math.log(1.0 / accuracy) / GRAVITY_RATE
+    return (n_objectives - 1) * math.log(1.0 / accuracy) / _GRAVITY_RATE
 
 
 def _weights(w: Array, n_objectives: int | None = None) -> Array:

@@ -1,9 +1,20 @@
 """Cutting-Plane Inverse Reinforcement Learning: whose weights make this behaviour optimal?
 
 Every policy pi satisfies w_E.mu(pi) <= w_E.mu_E for the expert's own weights, so each policy found
-cuts the simplex of weights: (mu_i - mu_E).w <= 0. The next query is a centre of what is left, and
-near the end, where the domain has sensitivities, a Newton step on the regret
-f(w) = max_pi w.mu(pi) - w.mu_E, which is convex and zero at w_E.
+cuts the simplex of weights. Algorithm 2, for an optimal expert whose features mu_E are known:
+
+1. P_0 is the simplex of all weights.
+2. w_k is the centre of P_k.
+3. pi_k is the best policy for w_k, with features mu_k.
+4. P_{k+1} is P_k cut by (mu_k - mu_E).w <= 0.
+5. Stop where pi_k does not beat the expert, w_k.(mu_k - mu_E) <= tol: w_k explains it; or where
+   P_{k+1} has no interior. Else go on with 2.
+
+Beyond it, estimated features and tolerances raise the expert by a level in step 4, and an expert
+that need not be optimal lowers the level to the least regret found (in place of Algorithm 3, which
+:mod:`walking_irl.cpirl.algorithm3` holds for comparison). Near the end, where the domain has
+sensitivities, step 2 is a Newton step on the regret f(w) = max_pi w.mu(pi) - w.mu_E, which is
+convex and zero at w_E.
 
 Source: S. Balloccu, Cutting-Plane methods for Inverse Reinforcement Learning (Politecnico di
 Milano), Algorithms 2 and 3.
@@ -12,56 +23,58 @@ Milano), Algorithms 2 and 3.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Executor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from walking_irl.cpirl import probes
-from walking_irl.cpirl.bundle import Archive
-from walking_irl.cpirl.guide import Decision, Guide, Measure, Tolerances
-from walking_irl.cpirl.record import snapshot
-from walking_irl.cpirl.stopping import StopRule
+from walking_irl.arrays import Array
+from walking_irl.cpirl.bundle import Bundle
+from walking_irl.cpirl.endings import BudgetSpent, Endings, StopRule, ending, endings_of, stopped
+from walking_irl.cpirl.levels import Levels, levels_of
+from walking_irl.cpirl.newton_phase import EstimatedNewton, ExactNewton, Measure, NewtonPhase
+from walking_irl.cpirl.outlook import Decision, Outlook, Query
+from walking_irl.cpirl.probes import Probes, Probing
+from walking_irl.cpirl.queries import Centres, kelley
+from walking_irl.cpirl.record import record
 from walking_irl.errors import InvalidInputError
 from walking_irl.expert import check_expert
-from walking_irl.geometry.centres import centre_rule
-from walking_irl.types import MODES, Expert, Forward, Iteration, Mode, Rule, Status
+from walking_irl.geometry.centres import OwnCentre, centre_rule
+from walking_irl.types import Expert, Forward, Iteration, Mode, Rule, Status
 
 
 def cpirl(
     forward: Forward,
     expert: Expert,
     *,
-    centre: str = "ac",
+    centre: str | OwnCentre = "ac",
     mode: Mode = "optimal",
     tol: float = 1e-6,
-    tol_w: float | None = None,
     max_solves: int = 60,
     min_weight: float = 0.0,
     rng: np.random.Generator,
     measure: Measure | None = None,
-    executor: Executor | None = None,
-    probe: float | None = None,
+    probe: float | Probing | None = None,
     stop: Sequence[StopRule] = (),
 ) -> Iterator[Iteration]:
     """Recover the weights under which an expert is optimal; one iteration per forward solve.
 
     Args:
-        forward: Solves "best policy for w"; picklable where an executor is given.
+        forward: Solves "best policy for w"; picklable where probes have an executor.
         expert: What is known of the expert. With a ``covariance`` it counts as estimated.
-        centre: Key of the centre: ac, cg, mvie or cc.
+        centre: Key of the centre (ac, cg, mvie or cc), or a function of the polyhedron and ``rng``
+            that returns a point inside it, as :class:`~walking_irl.geometry.centres.Centre` or as
+            weights.
         mode: "optimal" keeps weights with f <= 0; "set" those with f <= tol |w.mu_E|; "minimise"
             lowers f as far as it goes, for an expert that need not be optimal.
         tol: Regret that counts as none, relative to |w.mu_E|.
-        tol_w: Newton step (L1) that counts as none; 2e-4 (exact) or 1e-3 (estimated) by default.
         max_solves: Budget of forward solves, before probes.
         min_weight: Lower bound of every weight.
         rng: Used by sampling centres, and to move a centre that repeats itself.
         measure: Maps a policy to the mean (K,) and covariance (K, K) of its features when measured
             as an estimated expert's were; the difference to its ``mu`` corrects the expert.
-        executor: Solves the probes side by side.
-        probe: Relative tolerance whose extreme weights are solved for at the end, or None for no
-            probes: one solve for each of the 2K bounds, in "set" mode until each bound is reached.
+        probe: Relative regret whose extreme weights are solved for at the end (with an executor:
+            :class:`Probing`), or None for no probes: one solve for each of the 2K bounds, in "set"
+            mode until each bound is reached.
         stop: Further stop rules.
 
     Yields:
@@ -71,34 +84,63 @@ def cpirl(
         InvalidInputError: If an argument is out of range, or no policy achieves the expert's
             features.
     """
-    if mode not in MODES:
-        raise InvalidInputError(f"unknown mode {mode!r}; choose from {', '.join(MODES)}")
-    if not tol > 0.0 or max_solves < 1 or (probe is not None and not probe > 0.0):
+    probing = Probing(probe) if isinstance(probe, int | float) else probe
+    if not tol > 0.0 or max_solves < 1 or (probing is not None and not probing.level > 0.0):
         raise InvalidInputError("tol, max_solves and probe must be positive")
+    levels = levels_of(mode, tol)
     check_expert(expert)
-    is_exact = expert.covariance is None
-    archive = Archive(expert, min_weight)
-    step = tol_w if tol_w is not None else (2e-4 if is_exact else 1e-3)
-    tolerances = Tolerances(tol, step, 1e-7 if is_exact else 3e-3)
-    guide = Guide(archive, centre_rule(centre), mode, tolerances, measure, rng)
+    bundle = Bundle.of(expert, min_weight)
+    search = _Search(
+        levels,
+        Centres(centre_rule(centre), rng),
+        ExactNewton(levels) if bundle.is_exact else EstimatedNewton(levels, measure),
+        endings_of(levels, bundle.is_exact, tol),
+    )
+    rules = (BudgetSpent(max_solves), *stop)
     history: list[Iteration] = []
-    decision = Decision(guide.start(), Rule.CENTRE, np.empty(0), Status.CUT)
-    while decision.w is not None:
-        w, rule, P = decision.w, decision.rule, guide.polyhedron()
-        archive.add(w, forward(w))
-        decision = guide.decide(rule)
-        if decision.w is not None and len(history) + 1 >= max_solves:
-            decision = decision._replace(w=None, status=Status.BUDGET)
-        iteration = snapshot(guide, len(history), P, w, rule, decision, None)
-        for rule_ in stop:
-            status = rule_([*history, iteration])
-            if status is not None and decision.w is not None:
-                decision = decision._replace(w=None, status=status)
-        iteration = replace(iteration, status=decision.status)
-        history.append(iteration)
-        if decision.w is not None:
-            yield iteration
-    if probe is None or not probes.may_probe(decision.status):
-        yield iteration
-    else:
-        yield from probes.probe(forward, guide, decision, iteration, probe, executor)
+    query: Query | None = search.centres.first(bundle, levels)  # steps 1 and 2
+    while query is not None:
+        bundle = bundle.add(query.w, forward(query.w))  # steps 3 and 4
+        outlook, decision = search.decide(bundle, query.rule)  # step 5, and step 2 of the next
+        bundle = outlook.bundle  # a measured defect may have corrected the expert
+        iteration = record(len(history), query, outlook, decision)
+        decision = stopped(decision, rules, [*history, iteration])
+        query = decision.query
+        probes = Probes(outlook, decision, probing if query is None else None)
+        status = decision.status if probes.is_over else Status.CUT
+        history.append(replace(iteration, status=status))
+        yield history[-1]
+    yield from probes.run(forward, len(history))
+
+
+@dataclass(frozen=True)
+class _Search:
+    """The parts that decide: levels, where to ask next, and when to end."""
+
+    levels: Levels
+    centres: Centres
+    newton: NewtonPhase
+    endings: Endings
+
+    def decide(self, bundle: Bundle, rule: Rule) -> tuple[Outlook, Decision]:
+        """What is known after an answer to a query by ``rule``, and what to do next."""
+        outlook = Outlook(bundle, self.levels, rule, self.newton.fit(bundle))
+        end = ending(self.endings.regret, outlook)
+        if end is None and outlook.model is not None:
+            outlook = self.newton.advance(outlook)
+            end = ending(self.endings.newton, outlook)
+        if end is None:
+            query = self.newton.query(outlook) or kelley(outlook) or self.centres.query(outlook)
+            if isinstance(query, Query):
+                return outlook, Decision(query, self._estimate(outlook, query), Status.CUT)
+            outlook = replace(outlook, dead_end=query)
+            end = ending(self.endings.dead_end, outlook)
+        assert end is not None, "the last rule always ends the run"
+        w = self.newton.estimate(outlook) if end.estimate is None else end.estimate
+        return outlook, Decision(None, w, end.status)
+
+    def _estimate(self, outlook: Outlook, query: Query) -> Array:
+        """Before there is a model, the centre of the weights left; later its minimum."""
+        if query.centre is None or outlook.model is not None or not self.levels.has_known_minimum:
+            return self.newton.estimate(outlook)
+        return query.centre

@@ -9,17 +9,18 @@ import numpy as np
 
 from walking_irl.arrays import Array
 from walking_irl.cpirl.gauge import freedom_in_words
-from walking_irl.cpirl.newton import reduced
+from walking_irl.cpirl.regret_model import reduced
 from walking_irl.errors import InvalidInputError
-from walking_irl.geometry.polyhedron import EXACT_OBJECTIVES, WeightPolyhedron, plane_basis
+from walking_irl.geometry.plane import plane_basis
+from walking_irl.geometry.polyhedron import EXACT_OBJECTIVES, WeightPolyhedron
 from walking_irl.types import Expert, Iteration, Objective, Status
 
-ROUNDING = 1e-13
+_ROUNDING = 1e-13
 """Returns below this, relative to the expert's largest feature, are reported as 0."""
 
 
 @dataclass(frozen=True)
-class Recovery:
+class Summary:
     """What a run found; see :func:`summarise`.
 
     Attributes:
@@ -57,7 +58,7 @@ class Recovery:
 
 def summarise(
     iterations: Sequence[Iteration], expert: Expert, objectives: Sequence[Objective] = ()
-) -> Recovery:
+) -> Summary:
     """Summary of the iterations of one run.
 
     Args:
@@ -75,12 +76,12 @@ def summarise(
     names = [o.name for o in objectives] or [f"objective {i + 1}" for i in range(K)]
     scales = np.array([o.scale for o in objectives] or np.ones(K))
     condition, weakest = _identifiability(iterations, names)
-    rounding = ROUNDING * float(np.abs(expert.mu).max())
+    rounding = _ROUNDING * float(np.abs(expert.mu).max())
     certificate, regret = (
         0.0 if abs(value) <= rounding else value for value in (last.certificate, last.best_regret)
     )
     whole = WeightPolyhedron.simplex(K, last.polyhedron.min_weight)
-    return Recovery(
+    return Summary(
         w=last.estimate,
         rule=_rule(iterations, has_model=condition is not None),
         intervals=last.intervals,
@@ -108,7 +109,7 @@ def per_unit(interval: Sequence[float], unit: str) -> str:
     return f"{low:.3g} - {high:.3g}" + ("" if unit == "1" else f" per {unit}")
 
 
-def volume_left(found: Recovery) -> str:
+def volume_left(found: Summary) -> str:
     """Share of all weights' volume that is left, in words."""
     is_exact = len(found.w) <= EXACT_OBJECTIVES
     return f"{'' if is_exact else 'very roughly '}{found.volume_ratio:.1e} of the volume of all"
@@ -118,14 +119,14 @@ def noise_level(expert: Expert) -> str:
     """How well the expert's features are known, in words.
 
     >>> noise_level(Expert(np.array([2.0, 4.0]), np.array([0.1, 0.1]), n_samples=20))
-    'known from 20 recorded walks to within 5 % each'
+    'known from 20 trajectories to within 5 % each'
     """
     if not np.any(expert.error):
         return "known exactly"
     size = np.abs(expert.mu)
     relative = 100 * np.max(expert.error / np.maximum(size, 1e-3 * max(size.max(), 1e-300)))
-    walks = f" from {expert.n_samples} recorded walks" if expert.n_samples else ""
-    return f"known{walks} to within {relative:.2g} % each"
+    seen = f" from {expert.n_samples} trajectories" if expert.n_samples else ""
+    return f"known{seen} to within {relative:.2g} % each"
 
 
 def _rule(iterations: Sequence[Iteration], has_model: bool) -> str:

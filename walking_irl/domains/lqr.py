@@ -7,18 +7,19 @@ section 7.2; closed form by one scalar Riccati equation per axis.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize
 
 from walking_irl.arrays import Array
+from walking_irl.domains.exact import ExactDomain
 from walking_irl.domains.weights import checked_weights
 from walking_irl.errors import SolverError
 from walking_irl.types import Expert, Objective, Response
 
-SPOILT_BY = 0.25
+GAINS_OFF = 0.25
 """Relative error of a sub-optimal expert's gains."""
 
 
@@ -32,8 +33,8 @@ class LQRPicture(NamedTuple):
 
 
 @dataclass(frozen=True)
-class LQR:
-    """The problem; ``name`` and ``objectives`` make it a Domain.
+class LQR(ExactDomain):
+    """The problem.
 
     Attributes:
         n_objectives: K, the number of axes.
@@ -42,6 +43,7 @@ class LQR:
         start: Initial state of every axis.
         policy_noise: Variance of white noise on the input.
         perturbation: Relative error of a sub-optimal expert's gains; 0 for an optimal expert.
+        objectives: One per axis.
     """
 
     n_objectives: int = 3
@@ -50,20 +52,17 @@ class LQR:
     start: float = 10.0
     policy_noise: float = 0.0
     perturbation: float = 0.0
+    objectives: tuple[Objective, ...] = field(init=False, repr=False)
+    name = "lqr"
+    view = "lqr"
 
-    @property
-    def name(self) -> str:
-        """Name of the domain."""
-        return f"lqr{self.n_objectives}"
-
-    @property
-    def objectives(self) -> tuple[Objective, ...]:
-        """One objective per axis."""
+    def __post_init__(self) -> None:
         meaning = "keep axis {} near zero, at the price of the others' inputs"
-        return tuple(
+        objectives = tuple(
             Objective(f"axis {i + 1}", "1", 1.0, meaning.format(i + 1))
             for i in range(self.n_objectives)
         )
+        object.__setattr__(self, "objectives", objectives)
 
     def gains(self, w: Array) -> Array:
         """Optimal feedback u = k x per axis for weights ``w``, shape (K,)."""
@@ -98,13 +97,22 @@ class LQR:
     def forward(self, w: Array) -> Response:
         """Optimal gains for ``w``, with d mu/d w = (d mu/d k) diag(dk/dw)."""
         k, slope = self._gains_and_slopes(checked_weights(w, self.n_objectives))
+        noise = self.policy_noise * self.discount / (1 - self.discount)
+        sensitivity = -(self.start**2 + noise) * self._slopes(k) * slope
+        return Response(k, self.evaluate(k), 0.5 * (sensitivity + sensitivity.T))
+
+    def _slopes(self, k: Array) -> Array:
+        """Derivative of objective j's cost matrix on axis i in the gain of axis i, (K, K)."""
         Q, R = self._charges()
         g = self.discount
         closed = 1 - g * (1 + k) ** 2
-        dP = 2 * R * k / closed + (Q + R * k**2) * 2 * g * (1 + k) / closed**2
-        gain = self.start**2 + self.policy_noise * g / (1 - g)
-        sensitivity = -gain * dP * slope
-        return Response(k, self.evaluate(k), 0.5 * (sensitivity + sensitivity.T))
+        slopes: Array = 2 * R * k / closed + (Q + R * k**2) * 2 * g * (1 + k) / closed**2
+        return slopes
+
+    def policy_gradient(self, policy: Array) -> Array:
+        """Gradient of each objective in each gain, d mu_j / d k_i at [i, j], shape (K, K)."""
+        noise = self.policy_noise * self.discount / (1 - self.discount)
+        return -(self.start**2 + noise) * self._slopes(np.asarray(policy, dtype=np.float64)).T
 
     def expert(self, w_E: Array, rng: np.random.Generator) -> Expert:
         """Exact features of the optimal gains, perturbed where ``perturbation`` > 0."""
@@ -116,7 +124,7 @@ class LQR:
 
     def suboptimal_expert(self, w_E: Array, rng: np.random.Generator) -> Expert:
         """Expert with gains up to 25 % off, if this domain perturbs none already."""
-        return replace(self, perturbation=self.perturbation or SPOILT_BY).expert(w_E, rng)
+        return replace(self, perturbation=self.perturbation or GAINS_OFF).expert(w_E, rng)
 
     def advantage(self, mu: Array) -> float:
         """v* = min_w max_pi w.(mu(pi) - mu): by how much a policy beats ``mu`` in every feature.
@@ -144,14 +152,6 @@ class LQR:
         if result.status != 0:
             raise SolverError(f"the least regret was not found: {result.message}")
         return float(result.fun)
-
-    def pack(self, policy: Array) -> Array:
-        """Gains as one array, for files: themselves."""
-        return np.asarray(policy)
-
-    def unpack(self, packed: Array) -> Array:
-        """Inverse of :meth:`pack`."""
-        return packed
 
     def picture(self, policy: Array, n_steps: int = 16) -> LQRPicture:
         """``n_steps`` steps under gains ``policy``, shape (K,)."""

@@ -24,21 +24,20 @@ from walking_irl.environments.suite import BODIES, load, tasks
 __all__ = ["BODIES", "IDS", "load", "tasks"]
 
 IDS = {
-    f"WalkingIRL/{prefix}Humanoid{suffix}-v0": (kind, bool(suffix))
+    f"WalkingIRL/{prefix}Humanoid{suffix}-v0": (kind, f"humanoid{suffix.lower()}")
     for prefix, kind in (("", "WalkerEnv"), ("mo-", "MOWalkerEnv"))
     for suffix in ("", "-Planar")
 }
-"""Ids of Gymnasium, each with its class in :mod:`walking_irl.environments.walker` and whether its
-body is planar."""
+"""Ids of Gymnasium, each with its class in :mod:`walking_irl.environments.walker` and its body."""
 
 
 def _register() -> None:
     from gymnasium import register, registry
 
-    for name, (kind, planar) in IDS.items():
+    for name, (kind, body) in IDS.items():
         if name not in registry:
             entry = f"walking_irl.environments.walker:{kind}"
-            register(name, entry_point=entry, kwargs={"planar": planar})
+            register(name, entry_point=entry, kwargs={"body": body})
 
 
 if find_spec("gymnasium") is not None:

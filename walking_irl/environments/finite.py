@@ -16,8 +16,8 @@ from walking_irl.rl.finite_mdp import FiniteMDP
 class FiniteEnv(Env[Any, Any]):
     """States and actions are numbers; the reward of a step is w.phi of the state that it leaves.
 
-    So the discounted sum of ``info["phi"]`` estimates mu of :class:`~walking_irl.rl.finite_mdp.FiniteMDP`. The world has no
-    end: episodes are truncated.
+    So the discounted sum of ``info["phi"]`` estimates mu of
+    :class:`~walking_irl.rl.finite_mdp.FiniteMDP`. The world has no end: episodes are truncated.
 
     Args:
         mdp: The world.

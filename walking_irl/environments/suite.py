@@ -11,20 +11,21 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from walking_irl.arrays import Array
-from walking_irl.domains.humanoid.body.anatomy import Walker, load_walker
+from walking_irl.domains.humanoid.body.anatomy import Walker
+from walking_irl.domains.humanoid.body.load import SHIPPED, load_walker
 from walking_irl.domains.humanoid.closed_loop.environment import (
     Disturbance,
     environment,
     start_of,
 )
-from walking_irl.domains.humanoid.closed_loop.progress import best_shipped
+from walking_irl.domains.humanoid.closed_loop.progress import best_known
 from walking_irl.domains.humanoid.gait.gait import Gait
 from walking_irl.domains.humanoid.gait.library import load_library
 from walking_irl.domains.weights import checked_weights
 from walking_irl.errors import InvalidInputError
 
-BODIES = {"humanoid": False, "humanoid-planar": True}
-"""Bodies, and whether each is planar."""
+BODIES = tuple(SHIPPED)
+"""Bodies by name; a model file of your own is one, too."""
 TIME_LIMIT = 10.0
 """Duration of an episode [s]."""
 NOISE = 0.02
@@ -45,10 +46,10 @@ def tasks(body: str = "humanoid") -> tuple[str, ...]:
     >>> tasks()[:2]
     ('reference', 'effort x3')
     """
-    return tuple(load_library(_is_planar(body)))
+    return tuple(load_library(body))
 
 
-def assignment(planar: bool, weights: str | Array) -> Assignment:
+def assignment(body: str, weights: str | Array) -> Assignment:
     """Weights of the simplex and their gait, from a task's name or six weights.
 
     Raises:
@@ -58,11 +59,11 @@ def assignment(planar: bool, weights: str | Array) -> Assignment:
         weights = np.asarray(weights, dtype=float)
         total = float(weights.sum()) or 1.0
         w = checked_weights(weights / total, 6)
-        return Assignment(load_walker(planar), w, best_shipped(w, planar).gait)
-    library = load_library(planar)
+        return Assignment(load_walker(body), w, best_known(w, body).gait)
+    library = load_library(body)
     if weights not in library:
         raise InvalidInputError(f"unknown task {weights!r}; choose from {', '.join(library)}")
-    return Assignment(load_walker(planar), library[weights].w, library[weights].gait)
+    return Assignment(load_walker(body), library[weights].w, library[weights].gait)
 
 
 def load(
@@ -78,7 +79,7 @@ def load(
     """A ``dm_control.rl.control.Environment`` in which a body walks.
 
     Args:
-        body: "humanoid" or "humanoid-planar".
+        body: "humanoid", "humanoid-planar", or the path of a model file of your own.
         task: A name of :func:`tasks`, or six weights of your own.
         rng: Source of the disturbances; without one, every run is the same.
         time_limit: End of an episode [s].
@@ -92,7 +93,7 @@ def load(
     >>> load("humanoid-planar", "reference").action_spec().shape
     (11,)
     """
-    walker, w, gait = assignment(_is_planar(body), task)
+    walker, w, gait = assignment(body, task)
     return environment(
         walker,
         start_of(walker, gait),
@@ -103,9 +104,3 @@ def load(
         time_limit=time_limit,
         disturbance=disturbance or Disturbance(velocity_noise=NOISE),
     )
-
-
-def _is_planar(body: str) -> bool:
-    if body not in BODIES:
-        raise InvalidInputError(f"unknown body {body!r}; choose from {', '.join(BODIES)}")
-    return BODIES[body]

@@ -22,7 +22,6 @@ from walking_irl.domains.humanoid.closed_loop.environment import (
     start_of,
 )
 from walking_irl.domains.humanoid.closed_loop.progress import FALL_METRES
-from walking_irl.domains.humanoid.costs.objectives import OBJECTIVES
 from walking_irl.domains.humanoid.gait.pictures import Image
 from walking_irl.environments.camera import Camera, Window
 from walking_irl.environments.observation import flatten, observation_names
@@ -41,12 +40,12 @@ class WalkerEnv(Env[Any, Any], EzPickle):
     of it, come with the next one, when the ground force at its end is known. Every ``info`` holds
 
     - ``phi`` (6,): the features of the last complete step;
-    - ``costs`` (6,): its folded costs, if it were as long as the gait's;
+    - ``costs`` (6,): its total costs, if it were as long as the gait's;
     - ``progress``: its length, in steps of the gait's mean length;
     - ``x``: the way walked since the start [m]; ``fell``: whether the walker has fallen.
 
     Args:
-        planar: Whether the body is the planar one.
+        body: "humanoid", "humanoid-planar", or the path of a model file of your own.
         weights: Six objective weights, or the name of a task, see :func:`.suite.tasks`.
         price: Of a metre; by default 5 % above the least cost per metre known, so that walking
             pays (see :mod:`walking_irl.domains.humanoid.closed_loop.progress`). 0 makes the reward
@@ -68,7 +67,7 @@ class WalkerEnv(Env[Any, Any], EzPickle):
     def __init__(
         self,
         *,
-        planar: bool = False,
+        body: str = "humanoid",
         weights: str | Array = "reference",
         price: float | None = None,
         time_limit: float = TIME_LIMIT,
@@ -85,7 +84,7 @@ class WalkerEnv(Env[Any, Any], EzPickle):
             raise InvalidInputError(
                 f"unknown render mode {render_mode!r}; choose from {', '.join(RENDER_MODES)}"
             )
-        self.walker, self.weights, self.gait = assignment(planar, weights)
+        self.walker, self.weights, self.gait = assignment(body, weights)
         self._env = environment(
             self.walker,
             start_of(self.walker, self.gait),
@@ -191,7 +190,7 @@ class MOWalkerEnv(WalkerEnv):
 
     def __init__(self, *, price: float = 0.0, **settings: Any) -> None:
         super().__init__(price=price, **settings)
-        self.objectives = tuple(o.name for o in OBJECTIVES)
+        self.objectives = tuple(o.name for o in self.task.stack.objectives)
         self.reward_dim = len(self.objectives)
         self.reward_space = Box(-np.inf, np.inf, (self.reward_dim,), np.float64)
 

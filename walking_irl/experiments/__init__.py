@@ -9,13 +9,25 @@ from pathlib import Path
 from typing import Any
 
 from walking_irl.errors import InvalidInputError
-from walking_irl.experiments import gridworld, humanoid, lqr, walking_path
+from walking_irl.experiments import (
+    forward_methods,
+    gridworld,
+    humanoid,
+    irl_continuous,
+    irl_methods,
+    lqr,
+    walking_path,
+)
 from walking_irl.experiments.runner import Progress, Runner
 from walking_irl.experiments.table import Table
 
 __all__ = ["TABLES", "run", "run_tables"]
 
 TABLES: dict[str, tuple[Callable[[Any, Runner], Table], Any]] = {
+    "2.1": (forward_methods.table_2_1, forward_methods.Config()),
+    "3.1a": (irl_methods.table_3_1a, irl_methods.Listing()),
+    "3.1b": (irl_methods.table_3_1b, irl_methods.Config()),
+    "3.1c": (irl_continuous.table_3_1c, irl_continuous.Config()),
     "7.1": (gridworld.table_7_1, gridworld.Config()),
     "fig7.1": (gridworld.figure_7_1, gridworld.Config()),
     "7.2": (gridworld.table_7_2, gridworld.Config()),
@@ -31,6 +43,8 @@ TABLES: dict[str, tuple[Callable[[Any, Runner], Table], Any]] = {
     "7.12": (humanoid.table_7_12, humanoid.Config()),
 }
 """What makes each table, and its default settings."""
+GROUPS = {"3.1": ("3.1a", "3.1b", "3.1c")}
+"""Names that stand for several tables."""
 
 
 def run(
@@ -63,7 +77,7 @@ def run_tables(
     """Write tables as Markdown, CSV, JSON and SVG; finished cells are kept in ``out/cells``.
 
     Args:
-        names: Names of :data:`TABLES`, or "all".
+        names: Names of :data:`TABLES` or :data:`GROUPS`, or "all".
         seeds: Hidden experts per cell, instead of each table's default.
         out: Folder for the results; made if it is missing.
         executor: Runs seeds side by side, e.g. a process pool.
@@ -75,8 +89,9 @@ def run_tables(
     Raises:
         InvalidInputError: If a name is unknown or ``seeds`` below 1.
     """
-    chosen = list(TABLES) if "all" in names else list(dict.fromkeys(names))
-    for name in names:
+    given = [part for name in names for part in GROUPS.get(name, (name,))]
+    chosen = list(TABLES) if "all" in given else list(dict.fromkeys(given))
+    for name in given:
         if name not in (*TABLES, "all"):
             choices = f"{', '.join(TABLES)} or all"
             raise InvalidInputError(f"unknown table {name!r}; choose from {choices}")

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from walking_irl.experiments.rows import CENTRES, baseline_rows
 from walking_irl.experiments.runner import Row, Runner
 from walking_irl.experiments.table import Table, machine
 from walking_irl.experiments.tasks import Task
 
 Grid = tuple[int, int, float, str]
 
-CENTRES = ("ac", "cg", "mvie", "cc")
 LARGE_CENTRES = ("ac", "mvie", "cc")
 NO_SAMPLES = "hit-and-run in 63 dimensions is not accurate enough to be called a centre of gravity"
 GAUGE = (
@@ -32,7 +32,7 @@ class Config:
             2004, whose regions tile the grid ("macro").
         large: Further grids for the centres only.
         share: Relative loss that counts as success: 1 % (thesis, section 7.1).
-        max_solves: Budget of CPIRL and of all rivals but MWAL.
+        max_solves: Budget of CPIRL and of all baselines but MWAL.
         mwal_rounds: Numbers T of MWAL's rounds, fixed in advance (Syed & Schapire 2007), each a
             row.
         samples: Sample counts of the centre of gravity, 50 to 5000 (thesis, figure 7.1).
@@ -78,28 +78,13 @@ def table_7_1(config: Config, runner: Runner) -> Table:
     return runner.table("7.1", "gridworld, J >= .99 J_E, centres", rows, config.seeds, GAUGE)
 
 
-def rivals(setting: str, task: Task, mwal_rounds: tuple[int, ...], is_finite: bool) -> list[Row]:
-    """Rows of the rivals; mixture and last policy are scored apart."""
-    jobs = [("mwal", f"MWAL T={T}", T) for T in mwal_rounds]
-    jobs += [("projection", "Projection", task.max_solves)]
-    jobs += [("max-margin", "Max-margin", task.max_solves)]
-    rows = []
-    for method, label, max_solves in jobs:
-        for scored in ("mixture", "last"):
-            job = replace(task, method=method, scored=scored, max_solves=max_solves, arguments={})
-            rows.append(Row(setting, f"{label}, {scored}", job))
-    lpal = replace(task, method="lpal", scored="mixture", arguments={}) if is_finite else None
-    rows.append(Row(setting, "LPAL (one program)", lpal, "LPAL needs a finite MDP"))
-    return rows
-
-
 def table_7_2(config: Config, runner: Runner) -> Table:
-    """CPIRL's analytic centre beside its rivals."""
+    """CPIRL's analytic centre beside the baselines."""
     rows = []
     for grid in config.grids:
         setting, task = _task(config, *grid)
         rows.append(Row(setting, "CPIRL-AC", replace(task, arguments={"centre": "ac"})))
-        rows += rivals(setting, task, config.mwal_rounds, is_finite=True)
+        rows += baseline_rows(setting, task, config.mwal_rounds, is_finite=True)
     return runner.table("7.2", "gridworld, J >= .99 J_E, algorithms", rows, config.seeds, GAUGE)
 
 

@@ -4,20 +4,23 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from walking_irl.experiments.gridworld import rivals
-from walking_irl.experiments.lqr import NOTES as LQR_NOTES
-from walking_irl.experiments.lqr import centre_rows, dominance_rows
+from walking_irl.experiments.rows import (
+    SOLVER_NOTES,
+    baseline_rows,
+    centre_rows,
+    dominance_rows,
+)
 from walking_irl.experiments.runner import Row, Runner
 from walking_irl.experiments.table import Table
 from walking_irl.experiments.tasks import Task
 
 NOTES = (
-    *LQR_NOTES,
-    "The rivals' queries are mixed with 5 % uniform weights: the gait of a vanishing weight is "
+    *SOLVER_NOTES,
+    "The baselines' queries are mixed with 5 % equal weights: the gait of a vanishing weight is "
     "ill-defined. CPIRL's weights are at least .005, as in the main job.",
     "Every learner's solver starts from the demonstrated gait, and again from the best gait it "
     "knows where it ends worse than that.",
-    "Experts are known exactly. The body in space has the rows of the analytic centre only: its "
+    "Experts are known exactly. The 3-D body has the rows of the analytic centre only: its "
     "solves take twice as long.",
 )
 SETTINGS = {"humanoid-planar": "planar, 14 joints", "humanoid": "3-D, 25 joints"}
@@ -50,7 +53,7 @@ def table_7_11(config: Config, runner: Runner) -> Table:
     first, *others = config.bodies
     setting, task = _task(config, first, "return")
     rows = centre_rows(setting, task)
-    rows += rivals(setting, task, (config.max_solves,), is_finite=False)
+    rows += baseline_rows(setting, task, (config.max_solves,), is_finite=False)
     for body in others:
         rows += centre_rows(*_task(config, body, "return"), centres=("ac",))
     title = "humanoid, within 1 % of J_E, centres and algorithms"
@@ -62,7 +65,7 @@ def table_7_12(config: Config, runner: Runner) -> Table:
     first, *others = config.bodies
     setting, task = _task(config, first, "dominance")
     rows = dominance_rows(setting, task)
-    rows += rivals(setting, task, (config.max_solves,), is_finite=False)
+    rows += baseline_rows(setting, task, (config.max_solves,), is_finite=False)
     for body in others:
         setting, task = _task(config, body, "dominance")
         for label, arguments in (

@@ -4,7 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from walking_irl.experiments.gridworld import CENTRES, rivals
+from walking_irl.experiments.rows import (
+    SOLVER_NOTES,
+    baseline_rows,
+    centre_rows,
+    dominance_rows,
+    level_rows,
+)
 from walking_irl.experiments.runner import Row, Runner
 from walking_irl.experiments.table import Table
 from walking_irl.experiments.tasks import Task
@@ -21,7 +27,7 @@ class Config:
         least_advantage: By how much some policy must beat a sub-optimal expert in every feature,
             relative to its mean |feature|: about half of all perturbed experts are optimal for
             other weights, within this, and no single policy clearly dominates those.
-        max_solves: Budget of CPIRL and of all rivals but MWAL.
+        max_solves: Budget of CPIRL and of all baselines but MWAL.
         mwal_rounds: Numbers T of MWAL's rounds, fixed in advance, each a row.
         seeds: Hidden experts per cell.
     """
@@ -51,28 +57,6 @@ def _tasks(config: Config, criterion: str) -> list[tuple[str, Task]]:
         )
         for n in config.sizes
     ]
-
-
-def centre_rows(setting: str, task: Task, centres: tuple[str, ...] = CENTRES) -> list[Row]:
-    """CPIRL with each centre by cuts alone, and with Newton steps."""
-    rows = [
-        Row(setting, f"CPIRL-{c.upper()}", replace(task, arguments={"centre": c})) for c in centres
-    ]
-    newton = replace(task, arguments={"centre": "ac", "has_newton": True})
-    return [*rows, Row(setting, "CPIRL-AC + Newton", newton)]
-
-
-def dominance_rows(setting: str, task: Task, centres: tuple[str, ...] = CENTRES) -> list[Row]:
-    """A dominating policy by levels, a dominating mixture, Algorithm 3; and with Newton steps."""
-    rows = []
-    for c in centres:
-        level = replace(task, arguments={"centre": c})
-        label = f"CPIRL-{c.upper()}"
-        rows.append(Row(setting, f"{label} level, single policy", level))
-        rows.append(Row(setting, f"{label} level, mixture", replace(level, scored="mixture")))
-        rows.append(Row(setting, f"{label} Algorithm 3", replace(level, method="utopia")))
-    newton = replace(task, arguments={"centre": "ac", "has_newton": True})
-    return [*rows, Row(setting, "CPIRL-AC level + Newton, single policy", newton)]
 
 
 def _every_draw(setting: str, task: Task) -> list[Row]:
@@ -106,8 +90,10 @@ def table_7_4(config: Config, runner: Runner) -> Table:
     rows = []
     for setting, task in _tasks(config, "return"):
         rows.append(Row(setting, "CPIRL-AC", replace(task, arguments={"centre": "ac"})))
-        rows += rivals(setting, task, config.mwal_rounds, is_finite=False)
-    return runner.table("7.4", "LQR, within 2 % of J_E, algorithms", rows, config.seeds, NOTES)
+        rows += baseline_rows(setting, task, config.mwal_rounds, is_finite=False)
+    return runner.table(
+        "7.4", "LQR, within 2 % of J_E, algorithms", rows, config.seeds, SOLVER_NOTES
+    )
 
 
 def table_7_5(config: Config, runner: Runner) -> Table:
@@ -124,16 +110,7 @@ def table_7_6(config: Config, runner: Runner) -> Table:
     """Algorithms, sub-optimal expert."""
     rows = []
     for setting, task in _tasks(config, "dominance"):
-        level = replace(task, arguments={"centre": "ac"})
-        rows.append(Row(setting, "CPIRL-AC level, single policy", level))
-        rows.append(Row(setting, "CPIRL-AC level, mixture", replace(level, scored="mixture")))
-        rows += rivals(setting, task, config.mwal_rounds, is_finite=False)
+        rows += level_rows(setting, task)
+        rows += baseline_rows(setting, task, config.mwal_rounds, is_finite=False)
     title = "LQR, sub-optimal expert, mu >= mu_E, algorithms"
-    return _with_draws(runner.table("7.6", title, rows, config.seeds, NOTES))
-
-
-NOTES = (
-    "Projection and max-margin query w >= 0 only (one-sided distance): the solver needs it.",
-    "MWAL is told the largest |mu - mu_E| over the corners of the simplex (K solves that are not "
-    "counted) and T, its number of rounds, which sets the size of its steps.",
-)
+    return _with_draws(runner.table("7.6", title, rows, config.seeds, SOLVER_NOTES))

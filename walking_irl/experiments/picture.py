@@ -1,4 +1,4 @@
-"""Pictures of tables, as SVG: solves by method, and steps against samples."""
+"""Pictures of tables, as SVG: solves or losses by method, and steps against samples."""
 
 from __future__ import annotations
 
@@ -6,9 +6,13 @@ import math
 from collections.abc import Sequence
 from html import escape
 from itertools import groupby
+from textwrap import wrap
+from typing import NamedTuple
 
-OURS, RIVAL, FAINT, INK = "#3b6fb6", "#9a9a9a", "#e2e2e2", "#222222"
-ROW, LABELS, PLOT, RESULT = 20, 250, 420, 90
+from walking_irl.arrays import Array
+
+OURS, BASELINE, FAINT, INK = "#3b6fb6", "#9a9a9a", "#e2e2e2", "#222222"
+ROW, LABELS, PLOT, RESULT = 20, 270, 420, 90
 """Height of a row; widths of labels, of the plot and of the results beside it [px]."""
 
 
@@ -36,7 +40,7 @@ def solves_chart(title: str, rows: Sequence[Sequence[str]]) -> str:
         y += ROW + 2
         for _, method, mean, error, success in group:
             n, total = success.split("/")
-            colour = OURS if method.startswith("CPIRL") else RIVAL
+            colour = OURS if method.startswith("CPIRL") else BASELINE
             fill = colour if n == total else "white"
             middle = y + ROW / 2
             body.append(_text(LABELS - 8, middle + 4, method, anchor="end"))
@@ -89,6 +93,127 @@ def steps_chart(title: str, rows: Sequence[Sequence[str]]) -> str:
     body.append(_text(left + width / 2, top + height + 40, "samples of hit-and-run", "middle"))
     body.append(_text(8, top - 12, "steps, mean and standard deviation"))
     return _svg(title, left + width + 20, top + height + 52, body)
+
+
+class Loss(NamedTuple):
+    """One bar of a chart of losses."""
+
+    setting: str
+    method: str
+    value: float
+    low: float
+    """Ends of its error bar."""
+    high: float
+
+
+def loss_chart(title: str, bars: Sequence[Loss], caption: str) -> str:
+    """Bars of losses on a logarithmic axis from 1e-4 to 1, or as far as the largest goes.
+
+    Args:
+        title: Heading.
+        bars: From top to bottom; equal settings in a row stand under one heading.
+        caption: What value and error bar are.
+    """
+    least = 1e-4
+    most = max([1.0, *(bar.high for bar in bars)])
+    decades = math.log10(most / least)
+
+    def x(value: float) -> float:
+        return LABELS + PLOT * math.log10(max(value, least) / least) / decades
+
+    body, y = [], 50.0
+    for setting, group in groupby(bars, key=lambda bar: bar.setting):
+        body.append(_text(8, y + 14, setting, weight="bold"))
+        y += ROW + 2
+        for bar in group:
+            colour = OURS if bar.method.startswith("CPIRL") else BASELINE
+            middle = y + ROW / 2
+            body.append(_text(LABELS - 8, middle + 4, bar.method, anchor="end"))
+            body.append(
+                f'<rect x="{LABELS}" y="{y + 4:g}" width="{max(x(bar.value) - LABELS, 1.5):.1f}" '
+                f'height="{ROW - 8}" fill="{colour}" stroke="{colour}"/>'
+            )
+            body.append(_line(x(bar.low), middle, x(bar.high), middle, INK))
+            label = "0" if bar.value < 1e-12 else f"{bar.value:.2g}"
+            body.append(_text(max(x(bar.high), LABELS + 2) + 6, middle + 4, label))
+            y += ROW
+        y += 8
+    ticks = [10.0**k for k in range(-4, math.floor(math.log10(most)) + 1)]
+    axis = [_line(x(v), 44, x(v), y, FAINT) for v in ticks]
+    axis += [_text(x(v), 38, f"{v:g}", anchor="middle") for v in ticks]
+    body.append(_text(8, y + 14, caption, colour="#666666"))
+    return _svg(title, LABELS + PLOT + RESULT, y + 26, [*axis, *body])
+
+
+def marks_chart(
+    title: str,
+    columns: Sequence[str],
+    rows: Sequence[tuple[str, Sequence[bool]]],
+    caption: str,
+) -> str:
+    """A table of marks: a full dot where something holds, a hollow one where it does not."""
+    width, top = 100.0, 50.0
+    body = [
+        _text(LABELS + (i + 0.5) * width, top, name, "middle", "bold")
+        for i, name in enumerate(columns)
+    ]
+    for row, (name, marks) in enumerate(rows):
+        y = top + ROW * (row + 1)
+        body.append(_text(LABELS - 8, y + 4, name, anchor="end"))
+        for i, is_true in enumerate(marks):
+            fill = OURS if is_true else "white"
+            body.append(
+                f'<circle cx="{LABELS + (i + 0.5) * width:.1f}" cy="{y:.1f}" r="5" '
+                f'fill="{fill}" stroke="{BASELINE}"/>'
+            )
+    bottom = top + ROW * (len(rows) + 2)
+    body.append(_text(8, bottom, caption, colour="#666666"))
+    return _svg(title, LABELS + width * len(columns) + 20, bottom + 12, body)
+
+
+def maps_chart(
+    title: str, tiles: Sequence[tuple[str, str, Array, bool]], levels: int, caption: str
+) -> str:
+    """Square maps side by side, five in a row, one path for each shade of a map.
+
+    Args:
+        title: Heading.
+        tiles: Name, figure below it, shades from 0 to levels - 1 of shape (n, n), and whether the
+            map is in our colour or grey.
+        levels: Number of shades.
+        caption: What the shades mean.
+    """
+    side, across, pitch = 112.0, 5, (156.0, 166.0)
+    body = []
+    for i, (name, figure, shades, is_ours) in enumerate(tiles):
+        x, y = 12 + (i % across) * pitch[0], 66 + (i // across) * pitch[1]
+        cell = side / len(shades)
+        body.append(_text(x, y - 18, name, weight="bold"))
+        body.append(_text(x, y - 5, figure, colour="#666666"))
+        for level in sorted({int(v) for v in shades.ravel()}):
+            share = level / max(levels - 1, 1)
+            cells = "".join(
+                f"M{c * cell:g} {r * cell:g}h{cell:g}v{cell:g}h-{cell:g}z"
+                for r, c in zip(*(shades == level).nonzero(), strict=True)
+            )
+            fill = _shade(OURS if is_ours else BASELINE, share)
+            body.append(f'<path transform="translate({x:g} {y:g})" d="{cells}" fill="{fill}"/>')
+        body.append(
+            f'<rect x="{x:g}" y="{y:g}" width="{side:g}" height="{side:g}" fill="none" '
+            f'stroke="{BASELINE}"/>'
+        )
+    rows = -(-len(tiles) // across)
+    bottom = 66 + rows * pitch[1]
+    lines = wrap(caption, 120)
+    body += [_text(12, bottom + 14 * i, line, colour="#666666") for i, line in enumerate(lines)]
+    return _svg(title, 12 + across * pitch[0], bottom + 14 * len(lines), body)
+
+
+def _shade(colour: str, share: float) -> str:
+    """From white (0) to a dark form of the colour (1), as #rrggbb."""
+    rgb = [int(colour[i : i + 2], 16) for i in (1, 3, 5)]
+    mixed = [round(255 + (0.7 * c - 255) * share) for c in rgb]
+    return "#" + "".join(f"{c:02x}" for c in mixed)
 
 
 def _numbers(cell: str) -> tuple[float, float]:

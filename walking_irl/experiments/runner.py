@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, as_completed
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from walking_irl.experiments.table import COLUMNS, Table, machine, summary
-from walking_irl.experiments.tasks import Task, run_task
+from walking_irl.experiments.tasks import Task
+from walking_irl.files import write_file
 from walking_irl.versions import versions
 
 Progress = Callable[[str, int, int], None]
@@ -23,7 +23,7 @@ Progress = Callable[[str, int, int], None]
 NOTES = (
     "Solves end with the first success, or with the method's own end or budget.",
     "Time in queries is all but the forward solves; for CPIRL it includes the weight intervals of "
-    "every iteration, which no rival computes.",
+    "every iteration, which no baseline computes.",
     "|dw| is that of CPIRL's estimate after the last solve (its next centre or Newton step); where "
     "there is no estimate, that of the last query.",
     "n/a in a column: the method has no such figure (signed weights are no estimate on the "
@@ -38,6 +38,23 @@ def code_digest() -> str:
     for path in sorted(Path(__file__).parents[1].rglob("*.py")):
         digest.update(path.read_bytes())
     return digest.hexdigest()
+
+
+class Job(Protocol):
+    """A picklable piece of work for one seed; equal jobs have equal results but for the clock."""
+
+    def key(self) -> dict[str, Any]:
+        """What is done, as JSON types; no two kinds of jobs may have equal keys."""
+        ...
+
+    def run(self) -> dict[str, Any]:
+        """Do it: the outcome as JSON types."""
+        ...
+
+
+def run_job(job: Job) -> dict[str, Any]:
+    """Do a job, in whatever process this is."""
+    return job.run()
 
 
 @dataclass(frozen=True)
@@ -88,8 +105,8 @@ class Runner:
         header = {"seeds": seeds, **machine()}
         return Table(name, title, COLUMNS, tuple(lines), (*NOTES, *notes, *reasons), header, raw)
 
-    def outcomes(self, name: str, tasks: Sequence[Task]) -> list[dict[str, Any]]:
-        """Outcome of each task, from the cache where it is there."""
+    def outcomes(self, name: str, tasks: Sequence[Job]) -> list[dict[str, Any]]:
+        """Outcome of each job, from the cache where it is there."""
         found = [self._cached(task) for task in tasks]
         missing = [i for i, outcome in enumerate(found) if outcome is None]
         n_done = len(tasks) - len(missing)
@@ -101,19 +118,19 @@ class Runner:
                 self.progress(name, n_done, len(tasks))
         return [outcome for outcome in found if outcome is not None]
 
-    def _run(self, tasks: Sequence[Task], missing: Sequence[int]) -> Any:
+    def _run(self, tasks: Sequence[Job], missing: Sequence[int]) -> Any:
         if self.executor is None:
-            return ((i, run_task(tasks[i])) for i in missing)
-        futures = {self.executor.submit(run_task, tasks[i]): i for i in missing}
+            return ((i, run_job(tasks[i])) for i in missing)
+        futures = {self.executor.submit(run_job, tasks[i]): i for i in missing}
         return ((futures[f], f.result()) for f in as_completed(futures))
 
-    def _path(self, task: Task) -> Path | None:
+    def _path(self, task: Job) -> Path | None:
         if self.cache is None:
             return None
         text = json.dumps([code_digest(), versions(), machine(), task.key()], sort_keys=True)
         return self.cache / f"{hashlib.sha256(text.encode()).hexdigest()[:24]}.json"
 
-    def _cached(self, task: Task) -> dict[str, Any] | None:
+    def _cached(self, task: Job) -> dict[str, Any] | None:
         path = self._path(task)
         if path is None or not path.exists():
             return None
@@ -123,11 +140,9 @@ class Runner:
             return None
         return outcome
 
-    def _keep(self, task: Task, outcome: dict[str, Any]) -> None:
+    def _keep(self, task: Job, outcome: dict[str, Any]) -> None:
         path = self._path(task)
         if path is None:
             return
         path.parent.mkdir(parents=True, exist_ok=True)
-        part = path.with_suffix(".part")
-        part.write_text(json.dumps(outcome))
-        os.replace(part, path)
+        write_file(path, json.dumps(outcome).encode())

@@ -15,7 +15,7 @@ import numpy as np
 
 from walking_irl.arrays import Array
 from walking_irl.experiments.picture import solves_chart, steps_chart
-from walking_irl.run.report import write_json
+from walking_irl.files import write_file, write_json
 from walking_irl.versions import versions
 
 COLUMNS = (
@@ -43,6 +43,7 @@ class Table:
         notes: Sentences below the table.
         header: Seeds, versions and machine.
         raw: Outcomes behind the rows, for JSON.
+        chart: The picture as SVG, where the columns are not the common ones.
     """
 
     name: str
@@ -52,6 +53,7 @@ class Table:
     notes: tuple[str, ...] = ()
     header: dict[str, Any] = field(default_factory=dict)
     raw: tuple[dict[str, Any], ...] = ()
+    chart: str = ""
 
     def to_markdown(self) -> str:
         """The table with its header and notes."""
@@ -69,6 +71,8 @@ class Table:
 
     def picture(self) -> str:
         """The table's main figures as SVG."""
+        if self.chart:
+            return self.chart
         title = f"Table {self.name}: {self.title}"
         if self.columns != COLUMNS:
             return steps_chart(self.title, [row[:3] for row in self.rows])
@@ -78,22 +82,16 @@ class Table:
         """Write ``table_<name>.md``, ``.csv``, ``.json`` and ``.svg``; returns their paths."""
         stem = folder / f"table_{self.name.replace('.', '_')}"
         paths = [stem.with_suffix(s) for s in (".md", ".csv", ".json", ".svg")]
-        _write(paths[0], self.to_markdown())
-        _write(paths[1], self.to_csv())
+        write_file(paths[0], self.to_markdown().encode())
+        write_file(paths[1], self.to_csv().encode())
         content = {k: getattr(self, k) for k in ("name", "title", "columns", "rows", "notes")}
         write_json(paths[2], {**content, "header": self.header, "outcomes": list(self.raw)})
-        _write(paths[3], self.picture())
+        write_file(paths[3], self.picture().encode())
         return paths
 
 
 def _markdown(cells: Sequence[str]) -> str:
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
-
-
-def _write(path: Path, text: str) -> None:
-    part = path.with_name(path.name + ".part")
-    part.write_text(text)
-    os.replace(part, path)
 
 
 def machine() -> dict[str, Any]:

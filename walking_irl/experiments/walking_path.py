@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from walking_irl.experiments.gridworld import rivals
-from walking_irl.experiments.lqr import NOTES as LQR_NOTES
-from walking_irl.experiments.lqr import centre_rows, dominance_rows
+from walking_irl.experiments.rows import (
+    SOLVER_NOTES,
+    baseline_rows,
+    centre_rows,
+    dominance_rows,
+    level_rows,
+)
 from walking_irl.experiments.runner import Row, Runner
 from walking_irl.experiments.table import Table
 from walking_irl.experiments.tasks import Task
 
 NOTES = (
-    *LQR_NOTES,
-    "The rivals' queries are mixed with 5 % uniform weights: where a term costs nothing, "
+    *SOLVER_NOTES,
+    "The baselines' queries are mixed with 5 % equal weights: where a term costs nothing, "
     "accelerations stick to their bounds.",
 )
 
@@ -25,7 +29,7 @@ class Config:
     Attributes:
         n_intervals: N of the path model; 20 costs a third of 40 and moves J by 1e-3.
         share: 1 % of |J_E| (thesis, section 7.3).
-        max_solves: Budget of CPIRL and of all rivals but MWAL.
+        max_solves: Budget of CPIRL and of all baselines but MWAL.
         mwal_rounds: Numbers T of MWAL's rounds, fixed in advance, each a row; small, for a solve
             takes a third of a second.
         seeds: Hidden experts per cell.
@@ -59,7 +63,7 @@ def table_7_8(config: Config, runner: Runner) -> Table:
     """Algorithms, optimal expert."""
     setting, task = _task(config, "return")
     rows = [Row(setting, "CPIRL-AC", replace(task, arguments={"centre": "ac"}))]
-    rows += rivals(setting, task, config.mwal_rounds, is_finite=False)
+    rows += baseline_rows(setting, task, config.mwal_rounds, is_finite=False)
     title = "walking path, within 1 % of J_E, algorithms"
     return runner.table("7.8", title, rows, config.seeds, NOTES)
 
@@ -74,11 +78,7 @@ def table_7_9(config: Config, runner: Runner) -> Table:
 def table_7_10(config: Config, runner: Runner) -> Table:
     """Algorithms, sub-optimal expert."""
     setting, task = _task(config, "dominance")
-    level = replace(task, arguments={"centre": "ac"})
-    rows = [
-        Row(setting, "CPIRL-AC level, single policy", level),
-        Row(setting, "CPIRL-AC level, mixture", replace(level, scored="mixture")),
-        *rivals(setting, task, config.mwal_rounds, is_finite=False),
-    ]
+    rows = level_rows(setting, task)
+    rows += baseline_rows(setting, task, config.mwal_rounds, is_finite=False)
     title = "walking path, sub-optimal expert, mu >= mu_E, algorithms"
     return runner.table("7.10", title, rows, config.seeds, NOTES)

@@ -19,12 +19,12 @@ from scipy.optimize import linprog
 from walking_irl.arrays import Array
 from walking_irl.errors import SolverError
 
-VIOLATION = 1e-12
+_VIOLATION = 1e-12
 """By how much a row may be missed before it enters the basis."""
-PROVEN = 1e-11
+_PROVEN = 1e-11
 """Largest violated row and smallest multiplier, relative to the others, of a proven optimum."""
-SMALLEST_PIVOT = 1e-10
-MOST_PIVOTS = 50
+_SMALLEST_PIVOT = 1e-10
+_MOST_PIVOTS = 50
 """Per variable; about 3 are needed."""
 
 
@@ -60,8 +60,8 @@ def maximise(C: Array, A: Array, b: Array, basis: NDArray[np.intp]) -> Optimum:
         rows = A[basis]
         x[:] = np.linalg.solve(rows, b[basis][..., None])[..., 0]
         tight[:] = np.linalg.solve(rows.swapaxes(1, 2), C[..., None])[..., 0]
-        is_proven = (x @ A.T - b).max(axis=1) <= PROVEN
-        is_proven &= tight.min(axis=1) >= -PROVEN * np.abs(tight).max(axis=1)
+        is_proven = (x @ A.T - b).max(axis=1) <= _PROVEN
+        is_proven &= tight.min(axis=1) >= -_PROVEN * np.abs(tight).max(axis=1)
     multipliers = np.zeros((p, len(b)))
     multipliers[np.arange(p)[:, None], basis] = np.maximum(tight, 0.0)
     for i in np.flatnonzero(~is_proven):
@@ -83,13 +83,13 @@ def _pivot(c: Array, A: Array, b: Array, basis: NDArray[np.intp]) -> NDArray[np.
     tableau[m, :n], tableau[m, n] = c @ inverse, c @ x
     excess, multipliers = tableau[:m, n], tableau[m, :n]
     basis = basis.copy()
-    for _ in range(MOST_PIVOTS * n):
+    for _ in range(_MOST_PIVOTS * n):
         enters = excess.argmax()
-        if excess[enters] <= VIOLATION:
+        if excess[enters] <= _VIOLATION:
             break
         change = tableau[enters].copy()
         rate = change[:n]  # the entering row by those of the basis
-        leaves = np.where(rate > SMALLEST_PIVOT, multipliers / rate, np.inf).argmin()
+        leaves = np.where(rate > _SMALLEST_PIVOT, multipliers / rate, np.inf).argmin()
         column = tableau[:, leaves] / rate[leaves]
         rate[leaves] -= 1.0
         tableau -= column[:, None] * change
@@ -111,10 +111,10 @@ def _pivot_all(C: Array, A: Array, b: Array, basis: NDArray[np.intp]) -> NDArray
     tableau[:, :n, n] = (tableau[:, :n, :n] @ b[basis][..., None])[..., 0]
     tableau[:, n] = (C[:, None] @ tableau[:, :n])[:, 0]
     basis = basis.copy()
-    for _ in range(MOST_PIVOTS * n):
+    for _ in range(_MOST_PIVOTS * n):
         slack = b - tableau[:, :n, n] @ A.T
         enters = slack.argmin(axis=1)
-        is_left = slack[k, enters] < -VIOLATION
+        is_left = slack[k, enters] < -_VIOLATION
         if not is_left.all():
             found[left] = basis
             left, basis, tableau, enters = (v[is_left] for v in (left, basis, tableau, enters))
@@ -124,7 +124,7 @@ def _pivot_all(C: Array, A: Array, b: Array, basis: NDArray[np.intp]) -> NDArray
         change = (A[enters][:, None] @ tableau[:, :n])[:, 0]
         change[:, n] -= b[enters]
         rate = change[:, :n]
-        ratio = np.where(rate > SMALLEST_PIVOT, tableau[:, n, :n] / rate, np.inf)
+        ratio = np.where(rate > _SMALLEST_PIVOT, tableau[:, n, :n] / rate, np.inf)
         leaves = ratio.argmin(axis=1)
         column = tableau[k, :, leaves] / rate[k, leaves][:, None]
         rate[k, leaves] -= 1.0

@@ -12,7 +12,7 @@ import numpy as np
 from walking_irl.arrays import Array
 from walking_irl.errors import InvalidInputError
 from walking_irl.geometry.dual_simplex import maximise
-from walking_irl.geometry.polyhedron import feasible, plane_basis
+from walking_irl.geometry.plane import feasible, plane_basis
 
 
 class Game(NamedTuple):

@@ -1,31 +1,24 @@
-"""Small dense geometry of bounded sets {z : A z <= b}: ball, log-barrier centre, vertices.
+"""Bounded sets {z : A z <= b}: their largest ball and their log-barrier centre.
 
-Source: Boyd and Vandenberghe, *Convex Optimization*, sections 8.5 and 9.6. Everything that depends
-on size is done in the coordinates whitened by the barrier's Hessian, so that a set of width 1e-6 is
-treated as accurately as one of width 1.
+Source: Boyd and Vandenberghe, *Convex Optimization*, sections 8.5 and 9.6.
 """
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
 from scipy.linalg.lapack import dgels
-from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
 from walking_irl.arrays import Array
 from walking_irl.errors import SolverError
 from walking_irl.geometry.dual_simplex import maximise
 
-LAWRENCE_AGREEMENT = 1e-6
-"""Relative difference of two volumes by Lawrence's formula that rounding explains."""
 FLAT_RADIUS = 1e-7
 """Inscribed radius up to which a set counts as flat: its weights are known well enough there."""
 
-SMALLEST_SLACK = 1e-14
+_SMALLEST_SLACK = 1e-14
 """A smaller slack, of rows with norm 1, is rounding."""
 
 
@@ -97,10 +90,10 @@ def barrier_centre(A: Array, b: Array, z: Array, max_iter: int = 60) -> BarrierC
         z = z + t * step
         slack = b - A @ z
         y = slack if is_inside or t == 1.0 else y * (1.0 - t * rate)
-        if is_inside and decrement <= 1e-14 or y.min() < SMALLEST_SLACK:
+        if is_inside and decrement <= 1e-14 or y.min() < _SMALLEST_SLACK:
             break
     # A decrement up to 1e-6 is rounding in the slacks of a very thin set: still well centred.
-    if not decrement <= 1e-6 or slack.min() < SMALLEST_SLACK:
+    if not decrement <= 1e-6 or slack.min() < _SMALLEST_SLACK:
         raise SolverError(f"analytic centre: Newton decrement {decrement:.1e}")
     return BarrierCentre(z, np.asarray(np.linalg.qr(A / slack[:, None], mode="r")), slack)
 
@@ -115,41 +108,29 @@ def _step_length(rate: Array, decrement: float, is_inside: bool) -> float:
     return t
 
 
-def whitened_rows(A: Array, centre: BarrierCentre, b: Array) -> Array:
-    """Rows of the same set in y = R (z - z_centre), with every right-hand side 1; shape (m, n)."""
-    slack = b - A @ centre.z
-    rows: Array = solve_triangular(centre.R, (A / slack[:, None]).T, trans="T").T
-    return rows
+def lazy_barrier_centre(A: Array, b: Array, is_lazy: NDArray[np.bool_], z: Array) -> BarrierCentre:
+    """Analytic centre of the rows that are not lazy, and of the lazy ones that matter.
 
+    A lazy row enters as soon as it cuts off the centre of those before it; many near-parallel
+    rows would otherwise push the centre away from them.
 
-def whitened_vertices(rows: Array) -> Array:
-    """Vertices of {y : rows y <= 1}, shape (n_vertices, n), without duplicates."""
-    if rows.shape[1] == 1:
-        return np.array([[1.0 / rows.min()], [1.0 / rows.max()]])
-    halfspaces = np.c_[rows, -np.ones(len(rows))]
-    origin = np.zeros(rows.shape[1])
-    try:
-        points = HalfspaceIntersection(halfspaces, origin).intersections
-    except QhullError:  # nearly parallel rows: let Qhull joggle its input
-        points = HalfspaceIntersection(halfspaces, origin, qhull_options="QJ").intersections
-    points = points[np.isfinite(points).all(axis=1)]
-    _, first = np.unique(np.round(points, 8), axis=0, return_index=True)
-    vertices: Array = points[np.sort(first)]
-    return vertices
+    Args:
+        A: Rows that bound z, shape (m, n).
+        b: Right-hand sides, shape (m,).
+        is_lazy: Which rows may be left out, shape (m,); the others bound z.
+        z: Start, shape (n,).
 
-
-def whitened_facets(rows: Array) -> NDArray[np.intp]:
-    """Indices of the rows that no other rows imply in {y : rows y <= 1}.
-
-    By polarity they are the vertices of the convex hull of the rows themselves.
+    Raises:
+        SolverError: See :func:`barrier_centre`.
     """
-    if rows.shape[1] == 1:
-        return np.unique([int(np.argmin(rows)), int(np.argmax(rows))])
-    try:
-        hull = ConvexHull(rows)
-    except QhullError:
-        hull = ConvexHull(rows, qhull_options="QJ")
-    return np.sort(hull.vertices).astype(np.intp)
+    is_used = ~is_lazy
+    while True:
+        centre = barrier_centre(A[is_used], b[is_used], z)
+        slack = b - A @ centre.z
+        worst = int(np.argmin(slack))
+        if slack[worst] > 0.0 or is_used[worst]:
+            return centre
+        is_used[worst] = True
 
 
 def distinct_rows(cuts: Array, is_lazy: NDArray[np.bool_]) -> tuple[Array, NDArray[np.bool_]]:
@@ -162,55 +143,3 @@ def distinct_rows(cuts: Array, is_lazy: NDArray[np.bool_]) -> tuple[Array, NDArr
     np.logical_and.at(lazy, group, is_lazy)
     order = np.argsort(first)
     return cuts[first[order]], lazy[order]
-
-
-def whitened_volume(rows: Array) -> float:
-    r"""Volume of the bounded set {y : rows y <= 1}, shape (m, n).
-
-    By the vertices and the n rows through each (J. Lawrence 1991, Polytope volume computation),
-
-    .. math:: \mathrm{vol} = \frac{1}{n!} \sum_v \frac{(c \cdot v)^n}{|\det A_v| \prod_i \gamma_i},
-        \qquad A_v^T \gamma = c
-
-    for any c: two random ones must agree. Where more than n rows meet in a vertex, or they do not
-    agree, by the convex hull of the vertices, which is exact too but up to 30 times slower.
-    """
-    n = rows.shape[1]
-    if n > 1:
-        try:
-            met = HalfspaceIntersection(np.c_[rows, -np.ones(len(rows))], np.zeros(n)).dual_facets
-        except QhullError:
-            met = []
-        if met and all(len(f) == n for f in met):
-            first, second = (_lawrence(rows[np.array(met)], seed) for seed in (1, 2))
-            if first > 0 and abs(first - second) < LAWRENCE_AGREEMENT * first:
-                return first
-    return hull_volume(whitened_vertices(rows))
-
-
-def _lawrence(corners: Array, seed: int) -> float:
-    """Lawrence's sum over vertices given by their n rows, shape (n_vertices, n, n)."""
-    n = corners.shape[1]
-    c = np.random.default_rng(seed).normal(size=(n,))
-    det = np.abs(np.linalg.det(corners))
-    corners, det = corners[det > 1e-300], det[det > 1e-300]
-    ones: Array = np.ones((len(corners), n, 1))
-    right: Array = np.tile(c[:, None], (len(corners), 1, 1))
-    try:
-        v = np.linalg.solve(corners, ones)
-        gamma = np.linalg.solve(np.swapaxes(corners, 1, 2), right)
-    except np.linalg.LinAlgError:
-        return -1.0
-    with np.errstate(all="ignore"):
-        terms = (v[..., 0] @ c) ** n / (det * np.prod(gamma[..., 0], axis=1))
-    return float(terms.sum() / math.factorial(n))
-
-
-def hull_volume(vertices: Array) -> float:
-    """Volume of the convex hull of points, shape (m, n), that span their space."""
-    if vertices.shape[1] == 1:
-        return float(np.ptp(vertices))
-    try:
-        return float(ConvexHull(vertices).volume)
-    except QhullError:
-        return float(ConvexHull(vertices, qhull_options="QJ").volume)

@@ -9,11 +9,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
 
 from walking_irl.arrays import Array
 from walking_irl.errors import (
@@ -27,35 +26,15 @@ from walking_irl.geometry.halfspaces import (
     FLAT_RADIUS,
     Ball,
     BarrierCentre,
-    barrier_centre,
     chebyshev_ball,
     distinct_rows,
-    whitened_facets,
-    whitened_rows,
-    whitened_vertices,
-    whitened_volume,
+    lazy_barrier_centre,
 )
+from walking_irl.geometry.plane import feasible, plane_basis
+from walking_irl.geometry.whitened import Whitened
 
 EXACT_OBJECTIVES = 7
 """Largest number of objectives for which vertices and volumes are enumerated exactly."""
-
-
-@lru_cache(maxsize=64)
-def plane_basis(n_objectives: int) -> Array:
-    """Orthonormal basis U of {v : sum(v) = 0}, shape (K, K-1), so that w = 1/K + U z."""
-    K = n_objectives
-    Q, _ = np.linalg.qr(np.c_[np.ones(K), np.eye(K)[:, : K - 1]])
-    U: Array = np.ascontiguousarray(Q[:, 1:K])
-    U.setflags(write=False)
-    return U
-
-
-def feasible(w: Array, min_weight: float) -> Array:
-    """Weights with rounding clipped onto their bounds, (..., K) -> (..., K)."""
-    excess = np.maximum(w - min_weight, 0.0)
-    share = 1.0 - w.shape[-1] * min_weight
-    normalised: Array = min_weight + share * excess / excess.sum(axis=-1, keepdims=True)
-    return normalised
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,22 +65,16 @@ class WeightPolyhedron:
         Raises:
             InvalidInputError: If K < 2 or not 0 <= K min_weight < 1.
         """
-        if n_objectives < 2:
-            raise InvalidInputError(f"need at least 2 objectives, got {n_objectives}")
-        if not 0.0 <= n_objectives * min_weight < 1.0:
-            raise InvalidInputError(
-                f"min_weight must lie in [0, 1/{n_objectives}), got {min_weight}"
-            )
-        return cls(n_objectives, min_weight, np.empty((0, n_objectives)), np.empty(0, dtype=bool))
+        K = n_objectives
+        if K < 2:
+            raise InvalidInputError(f"need at least 2 objectives, got {K}")
+        if not 0.0 <= K * min_weight < 1.0:
+            raise InvalidInputError(f"min_weight must lie in [0, 1/{K}), got {min_weight}")
+        return cls(K, min_weight, np.empty((0, K)), np.empty(0, dtype=bool))
 
     def cut(self, d: Array) -> WeightPolyhedron:
         """The part where d.w <= 0; ``d`` has shape (K,)."""
-        d = np.asarray(d, dtype=np.float64)
-        if d.shape != (self.n_objectives,):
-            raise InvalidInputError(
-                f"cut normal must have shape ({self.n_objectives},), got {d.shape}"
-            )
-        return self.cut_all(d[None])
+        return self.cut_all(_vector(d, self.n_objectives, "cut normal")[None])
 
     def cut_all(self, D: Array, is_lazy: NDArray[np.bool_] | None = None) -> WeightPolyhedron:
         """The part where every row of ``D`` satisfies d.w <= 0.
@@ -116,64 +89,40 @@ class WeightPolyhedron:
         Raises:
             InvalidInputError: If ``D`` has another width or a value that is not finite.
         """
-        K = self.n_objectives
-        D = np.asarray(D, dtype=np.float64)
-        if D.ndim != 2 or D.shape[1] != K:
-            raise InvalidInputError(f"cut normals must have shape (m, {K}), got {D.shape}")
-        if not np.isfinite(D).all():
-            raise InvalidInputError("cut normals must be finite")
+        K, D = self.n_objectives, _normals(D, self.n_objectives)
         lazy = np.zeros(len(D), dtype=bool) if is_lazy is None else np.asarray(is_lazy, dtype=bool)
-        norm = np.linalg.norm(D @ plane_basis(K), axis=1)
-        mean = D.mean(axis=1)
+        norm, mean = np.linalg.norm(D @ plane_basis(K), axis=1), D.mean(axis=1)
         # The simplex lies within distance 1 of its middle: beyond that a row holds or fails on all.
         matters = np.abs(mean) < norm
-        contradicts = bool(np.any(~matters & (mean > 0.0)))
-        cuts = np.r_[self.cuts, D[matters] / norm[matters, None]]
-        cuts, lazy = distinct_rows(cuts, np.r_[self.is_lazy, lazy[matters]])
-        return replace(
-            self,
-            cuts=cuts,
-            is_lazy=lazy,
-            is_contradictory=self.is_contradictory or contradicts,
-        )
+        fails = self.is_contradictory or bool(np.any(~matters & (mean > 0.0)))
+        unit = D[matters] / norm[matters, None]
+        cuts, lazy = distinct_rows(np.r_[self.cuts, unit], np.r_[self.is_lazy, lazy[matters]])
+        return replace(self, cuts=cuts, is_lazy=lazy, is_contradictory=fails)
 
     @cached_property
     def A(self) -> Array:
         """Unit rows of A z <= b, shape (K + m, K - 1): the K bounds of the weights, then cuts."""
         U = plane_basis(self.n_objectives)
-        rows: Array = np.r_[-U / self._bound_norm, self.cuts @ U]
-        return rows
+        return np.asarray(np.r_[-U / _bound_norm(self.n_objectives), self.cuts @ U])
 
     @cached_property
     def b(self) -> Array:
         """Right-hand sides of A z <= b, shape (K + m,)."""
         K = self.n_objectives
-        bounds = np.full(K, (1.0 / K - self.min_weight) / self._bound_norm)
-        right: Array = np.r_[bounds, -self.cuts.mean(axis=1)]
-        return right
-
-    @property
-    def _bound_norm(self) -> float:
-        return math.sqrt(1.0 - 1.0 / self.n_objectives)
+        bounds = np.full(K, (1.0 / K - self.min_weight) / _bound_norm(K))
+        return np.asarray(np.r_[bounds, -self.cuts.mean(axis=1)])
 
     def to_weights(self, z: Array) -> Array:
         """Weights of plane coordinates, (..., K-1) -> (..., K)."""
-        U = plane_basis(self.n_objectives)
-        w: Array = np.asarray(1.0 / self.n_objectives + z @ U.T)
-        return w
+        return np.asarray(1.0 / self.n_objectives + z @ plane_basis(self.n_objectives).T)
 
     def to_plane(self, w: Array) -> Array:
         """Plane coordinates of weights, (..., K) -> (..., K-1)."""
-        z: Array = np.asarray(w @ plane_basis(self.n_objectives))
-        return z
+        return np.asarray(w @ plane_basis(self.n_objectives))
 
     def contains(self, w: Array, tol: float = 1e-9) -> bool:
         """Whether no row is missed by more than ``tol`` (a Euclidean distance)."""
-        w = np.asarray(w, dtype=np.float64)
-        if w.shape != (self.n_objectives,):
-            raise InvalidInputError(
-                f"weights must have shape ({self.n_objectives},), got {w.shape}"
-            )
+        w = _vector(w, self.n_objectives, "weights")
         if self.is_contradictory or abs(w.sum() - 1.0) > max(tol, 1e-9):
             return False
         return bool(np.all(self.A @ self.to_plane(w) <= self.b + tol))
@@ -197,54 +146,35 @@ class WeightPolyhedron:
             EmptyPolyhedronError: If no weight satisfies every row.
             FlatPolyhedronError: If the inscribed radius is at most 1e-7.
         """
-        radius = self.ball.radius
+        radius, n = self.ball.radius, len(self.cuts)
         if radius < -FLAT_RADIUS:
-            raise EmptyPolyhedronError(
-                f"no weight satisfies all {len(self.cuts)} cuts (they miss by {-radius:.1e})",
-                radius,
-            )
+            miss = f"(they miss by {-radius:.1e})"
+            raise EmptyPolyhedronError(f"no weight satisfies all {n} cuts {miss}", radius)
         if radius <= FLAT_RADIUS:
-            raise FlatPolyhedronError(
-                f"the weights left by {len(self.cuts)} cuts are flat (radius {radius:.1e})", radius
-            )
+            size = f"(radius {radius:.1e})"
+            raise FlatPolyhedronError(f"the weights left by {n} cuts are flat {size}", radius)
         return self.ball
 
     @cached_property
     def barrier(self) -> BarrierCentre:
         """Analytic centre of the bounds, the cuts that are not lazy, and the lazy ones that matter.
 
-        A lazy row enters as soon as it cuts off the centre of those before it; many near-parallel
-        rows would otherwise push the centre away from them.
+        Raises:
+            EmptyPolyhedronError: If the set is empty or flat.
+        """
+        return _barrier(self)
+
+    @cached_property
+    def whitened(self) -> Whitened:
+        """The set in the coordinates that its analytic centre makes round.
 
         Raises:
             EmptyPolyhedronError: If the set is empty or flat.
         """
-        if not self.is_contradictory:
-            try:
-                centre = self._barrier_from(np.zeros(self.n_objectives - 1))
-                if float(np.min(self.b - self.A @ centre.z)) > FLAT_RADIUS:
-                    return centre  # proves the interior without a linear program
-            except SolverError:
-                pass
-        return self._barrier_from(self.chebyshev().z)
+        return Whitened.of(self.A, self.b, self.barrier)
 
-    def _barrier_from(self, z: Array) -> BarrierCentre:
-        is_used = np.r_[np.ones(self.n_objectives, dtype=bool), ~self.is_lazy]
-        while True:
-            centre = barrier_centre(self.A[is_used], self.b[is_used], z)
-            slack = self.b - self.A @ centre.z
-            worst = int(np.argmin(slack))
-            if slack[worst] > 0.0 or is_used[worst]:
-                return centre
-            is_used[worst] = True
-
-    @cached_property
-    def _whitened(self) -> Array:
-        return whitened_rows(self.A, self.barrier, self.b)
-
-    def _from_whitened(self, y: Array) -> Array:
-        """Weights of whitened coordinates, clipped onto the bounds against rounding."""
-        z = self.barrier.z + solve_triangular(self.barrier.R, y.T).T
+    def _weights(self, z: Array) -> Array:
+        """Weights of points of the set, with rounding clipped onto the weights' bounds."""
         return feasible(self.to_weights(z), self.min_weight)
 
     def vertices(self) -> Array:
@@ -254,60 +184,10 @@ class WeightPolyhedron:
             InvalidInputError: If K > 7.
             EmptyPolyhedronError: If the set is empty or flat.
         """
-        if self.n_objectives > EXACT_OBJECTIVES:
-            raise InvalidInputError(
-                f"vertices are enumerated up to {EXACT_OBJECTIVES} objectives, "
-                f"got {self.n_objectives}"
-            )
-        return self._from_whitened(whitened_vertices(self._whitened))
-
-    @property
-    def active_rows(self) -> NDArray[np.intp]:
-        """Indices into ``A`` of the rows that shape the set: no other rows imply them.
-
-        Raises:
-            EmptyPolyhedronError: If the set is empty or flat.
-        """
-        return whitened_facets(self._whitened)
-
-    def pruned(self) -> WeightPolyhedron:
-        """The same set without implied cuts (the bounds of the weights always stay).
-
-        The analytic centre depends on the rows, so pruning moves it; the set does not change.
-        """
-        K = self.n_objectives
-        active = self.active_rows
-        keep = active[active >= K] - K
-        return replace(self, cuts=self.cuts[keep], is_lazy=self.is_lazy[keep])
-
-    def relevance(self) -> Array:
-        """(b_i - a_i.z) / |a_i|_{H^-1} of each row at the analytic centre z, shape (K + m,).
-
-        At least 1 for the rows in the barrier. With m rows there, a relevance of sqrt(m (m - 1))
-        proves that the others imply the row, for the Dikin ellipsoid of that radius holds the set.
-
-        Raises:
-            EmptyPolyhedronError: If the set is empty or flat.
-        """
-        root = solve_triangular(self.barrier.R, np.eye(self.n_objectives - 1))
-        distance: Array = (self.b - self.A @ self.barrier.z) / np.linalg.norm(self.A @ root, axis=1)
-        return distance
-
-    def with_relevant(self, most: int) -> WeightPolyhedron:
-        """The same set with all but the ``most`` most relevant cuts lazy.
-
-        Nothing is dropped: a lazy cut enters the barrier where it cuts off its centre, and the
-        bounds of the weights are always in it.
-
-        Raises:
-            InvalidInputError: If ``most`` is negative.
-            EmptyPolyhedronError: If the set is empty or flat.
-        """
-        if most < 0:
-            raise InvalidInputError(f"most must not be negative, got {most}")
-        is_lazy = np.ones(len(self.cuts), dtype=bool)
-        is_lazy[np.argsort(self.relevance()[self.n_objectives :], kind="stable")[:most]] = False
-        return replace(self, is_lazy=is_lazy)
+        K, most = self.n_objectives, EXACT_OBJECTIVES
+        if K > most:
+            raise InvalidInputError(f"vertices are enumerated up to {most} objectives, got {K}")
+        return self._weights(self.whitened.to_plane(self.whitened.vertices()))
 
     def volume(self) -> float:
         """(K-1)-dimensional volume; exact for K <= 7, else scaled from the barrier's Hessian.
@@ -318,13 +198,9 @@ class WeightPolyhedron:
         """
         if self.ball.radius <= FLAT_RADIUS:
             return 0.0
-        n = self.n_objectives - 1
-        R = self.barrier.R
         if self.n_objectives <= EXACT_OBJECTIVES:
-            return whitened_volume(self._whitened) / abs(float(np.prod(R.diagonal())))
-        whole = WeightPolyhedron.simplex(self.n_objectives)
-        log_ratio = np.log(np.abs(whole.barrier.R.diagonal() / R.diagonal())).sum()
-        return math.sqrt(n + 1.0) / math.factorial(n) * math.exp(log_ratio)
+            return self.whitened.volume()
+        return _estimated_volume(self)
 
     def support(self, c: Array) -> tuple[float, Array]:
         """Largest c.w over the set, and a weight vector that attains it.
@@ -335,8 +211,7 @@ class WeightPolyhedron:
         Raises:
             EmptyPolyhedronError: If no weight satisfies every row.
         """
-        c = np.asarray(c, dtype=np.float64)
-        w = self.maximisers(c[None])[0]
+        w = self.maximisers(np.asarray(c, dtype=np.float64)[None])[0]
         return float(c @ w), w
 
     def maximisers(self, C: Array) -> Array:
@@ -350,14 +225,9 @@ class WeightPolyhedron:
         # Over the simplex alone c.w is largest in a corner: on all bounds but that of the best c_j.
         basis = (C.argmax(axis=1)[:, None] + np.arange(1, K)) % K
         try:
-            rows = self._whitened
+            return self._weights(self.whitened.maximisers(directions, basis))
         except FlatPolyhedronError:
-            z = maximise(directions, self.A, self.b + FLAT_RADIUS, basis).x
-            return feasible(self.to_weights(z), self.min_weight)
-        directions = solve_triangular(self.barrier.R, directions.T, trans="T").T
-        norm = np.linalg.norm(directions, axis=1, keepdims=True)
-        directions /= np.where(norm > 0.0, norm, 1.0)
-        return self._from_whitened(maximise(directions, rows, np.ones(len(rows)), basis).x)
+            return self._weights(maximise(directions, self.A, self.b + FLAT_RADIUS, basis).x)
 
     def intervals(self) -> Array:
         """Smallest and largest value of each weight, shape (K, 2), from 2K linear programs.
@@ -367,5 +237,45 @@ class WeightPolyhedron:
         """
         eye = np.eye(self.n_objectives)
         corners = self.maximisers(np.r_[-eye, eye])
-        extremes: Array = np.einsum("bjj->jb", corners.reshape(2, *eye.shape))
-        return extremes
+        return np.asarray(np.einsum("bjj->jb", corners.reshape(2, *eye.shape)))
+
+
+def _bound_norm(n_objectives: int) -> float:
+    """Length within the plane of the normal of a weight's own bound."""
+    return math.sqrt(1.0 - 1.0 / n_objectives)
+
+
+def _vector(value: Array, n_objectives: int, name: str) -> Array:
+    vector = np.asarray(value, dtype=np.float64)
+    if vector.shape != (n_objectives,):
+        raise InvalidInputError(f"{name} must have shape ({n_objectives},), got {vector.shape}")
+    return vector
+
+
+def _normals(D: Array, n_objectives: int) -> Array:
+    D = np.asarray(D, dtype=np.float64)
+    if D.ndim != 2 or D.shape[1] != n_objectives:
+        raise InvalidInputError(f"cut normals must have shape (m, {n_objectives}), got {D.shape}")
+    if not np.isfinite(D).all():
+        raise InvalidInputError("cut normals must be finite")
+    return D
+
+
+def _barrier(P: WeightPolyhedron) -> BarrierCentre:
+    """From the middle of the simplex, or, where that fails, from the largest inscribed ball."""
+    is_lazy = np.r_[np.zeros(P.n_objectives, dtype=bool), P.is_lazy]
+    if not P.is_contradictory:
+        try:
+            centre = lazy_barrier_centre(P.A, P.b, is_lazy, np.zeros(P.n_objectives - 1))
+            if float(np.min(P.b - P.A @ centre.z)) > FLAT_RADIUS:
+                return centre  # proves the interior without a linear program
+        except SolverError:
+            pass
+    return lazy_barrier_centre(P.A, P.b, is_lazy, P.chebyshev().z)
+
+
+def _estimated_volume(P: WeightPolyhedron) -> float:
+    """The simplex's volume, scaled by the determinants of the two barriers' Hessians."""
+    n, whole = P.n_objectives - 1, WeightPolyhedron.simplex(P.n_objectives).barrier
+    log_ratio = np.log(np.abs(whole.R.diagonal() / P.barrier.R.diagonal())).sum()
+    return math.sqrt(n + 1.0) / math.factorial(n) * math.exp(log_ratio)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from walking_irl.recording.experiment import Clock, Experiment, Other
-from walking_irl.recording.files import check_writable
 from walking_irl.recording.writer import Recorder, record_motion
 
-__all__ = ["Clock", "Experiment", "Other", "Recorder", "check_writable", "record_motion"]
+__all__ = ["Clock", "Experiment", "Other", "Recorder", "record_motion"]

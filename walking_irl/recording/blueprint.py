@@ -160,7 +160,7 @@ def _others(experiment: Experiment) -> list[rrb.View]:
     ]
     if experiment.w_expert is not None:
         paths = [f"/{distance_path(name)}" for name in experiment.others]
-        views.insert(0, _plots("Distance to the hidden weights (log10, L1)", paths))
+        views.insert(0, _plots("Distance to the ground-truth weights (log10, L1)", paths))
     return views
 
 

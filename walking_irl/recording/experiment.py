@@ -11,6 +11,7 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from walking_irl.arrays import Array
+from walking_irl.domains.contract import Truth
 from walking_irl.errors import InvalidInputError
 from walking_irl.recording.style import OTHERS, PLAYBACK_RATE
 from walking_irl.types import Expert, Objective
@@ -36,7 +37,8 @@ class Experiment:
         centre: Which centre of the polyhedron is queried.
         mode: The loop's mode.
         seed: Seed of the experiment, or None.
-        w_expert: Hidden weights where they are known, shape (K,); for the picture only.
+        truth: Ground-truth weights and noise-free features where they are known; for pictures only.
+        question: What the run answers, as the summary's title; "" for a general one.
         others: Names of further points, at most 4, that every iteration shows in the query's place.
     """
 
@@ -46,7 +48,8 @@ class Experiment:
     centre: str = "ac"
     mode: str = "optimal"
     seed: int | None = None
-    w_expert: Array | None = None
+    truth: Truth | None = None
+    question: str = ""
     others: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -55,21 +58,19 @@ class Experiment:
                 f"at most {len(OTHERS)} other points have colours, got {len(self.others)}"
             )
         K = len(self.objectives)
-        for what, x in (("expert.mu", self.expert.mu), ("w_expert", self.w_expert)):
+        for what, x in (("expert.mu", self.expert.mu), ("truth.w", self.w_expert)):
             if x is not None and np.shape(x) != (K,):
                 raise InvalidInputError(f"{what} must have shape ({K},), got {np.shape(x)}")
+
+    @property
+    def w_expert(self) -> Array | None:
+        """Ground-truth weights, shape (K,), or None."""
+        return None if self.truth is None else self.truth.w
 
     @property
     def names(self) -> list[str]:
         """Names of the objectives."""
         return [o.name for o in self.objectives]
-
-    def relative_loss(self, mu: Array) -> float | None:
-        """(J_E - J) / |J_E| under the hidden weights; None where they are not known."""
-        if self.w_expert is None:
-            return None
-        J_E, J = float(self.w_expert @ self.expert.mu), float(self.w_expert @ mu)
-        return (J_E - J) / max(abs(J_E), 1e-300)
 
 
 @dataclass(frozen=True)

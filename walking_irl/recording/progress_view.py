@@ -21,7 +21,7 @@ FIGURES = {
     "certificate": ("certificate", style.ESTIMATE),
     "best_regret": ("best regret", style.LEARNER),
     "regret": ("regret", style.FRAME),
-    "loss": ("loss under the hidden weights", style.EXPERT),
+    "loss": ("loss under the ground-truth weights", style.EXPERT),
     "volume_ratio": ("volume left", style.POLYHEDRON),
 }
 FLOOR = 1e-7
@@ -43,7 +43,7 @@ class ProgressView:
             _log_style(
                 stream,
                 weight_path(name),
-                ["lower", "query", "upper", "hidden"][: 3 + truth],
+                ["lower", "query", "upper", "ground truth"][: 3 + truth],
                 [style.POLYHEDRON, style.LEARNER, style.POLYHEDRON, style.EXPERT][: 3 + truth],
                 [1.0, 2.0, 1.0, 1.5][: 3 + truth],
             )
@@ -85,12 +85,13 @@ class ProgressView:
     def _figures(self, it: Iteration) -> dict[str, float | None]:
         if self._whole is None:
             self._whole = type(it.polyhedron).simplex(self._K).volume()
+        truth = self._experiment.truth
         return {
             "regret": it.regret,
             "best_regret": it.best_regret,
             "certificate": it.certificate,
             "volume_ratio": it.polyhedron.volume() / self._whole,
-            "loss": self._experiment.relative_loss(it.response.mu),
+            "loss": None if truth is None else truth.relative_loss(it.response.mu),
         }
 
     def _log_axes(self, stream: rr.RecordingStream) -> None:
@@ -140,7 +141,7 @@ def weight_path(name: str) -> str:
 
 
 def distance_path(name: str) -> str:
-    """Entity of a further point's distance to the hidden weights."""
+    """Entity of a further point's distance to the ground-truth weights."""
     return f"distance/{rr.escape_entity_path_part(name)}"
 
 
@@ -158,8 +159,7 @@ def line(it: Iteration) -> str:
     """One line on an iteration, for the log."""
     return (
         f"{it.k}: {it.rule.value}; regret {it.regret:.2e}, best {it.best_regret:.2e}, "
-        f"certificate {it.certificate:.2e}; widest interval "
-        f"{np.ptp(it.intervals, axis=1).max():.4f}; {it.status.value}"
+        f"certificate {it.certificate:.2e}; widest interval {it.widest:.4f}; {it.status.value}"
     )
 
 

@@ -15,7 +15,7 @@ import rerun_cli
 from rerun.experimental import ViewerClient
 
 from walking_irl.errors import RecordingError
-from walking_irl.recording.files import check_writable, write_atomically
+from walking_irl.files import check_writable, write_file
 from walking_irl.recording.reader import check_recording
 
 LOAD_SECONDS = 60.0
@@ -60,7 +60,7 @@ def save_screenshot(
         RecordingError: If the recording cannot be read, the picture cannot be written, or the
             viewer or Vulkan is missing.
     """
-    file, target = check_recording(path), check_writable(png)
+    file, target = check_recording(path), check_writable(png, RecordingError)
     try:
         with (
             _quiet(),
@@ -80,7 +80,7 @@ def save_screenshot(
         raise RecordingError(
             f"the viewer cannot draw without a screen ({reason}); {DRIVER}"
         ) from error
-    write_atomically(target, picture)
+    write_file(target, picture, RecordingError)
     return target
 
 

@@ -9,7 +9,7 @@ LEARNER: Colour = (28, 98, 190)
 ESTIMATE: Colour = (16, 140, 110)
 """The best estimate of the weights."""
 EXPERT: Colour = (200, 30, 70)
-"""The truth: hidden weights, the expert's features and joints."""
+"""The truth: ground-truth weights, the expert's features and joints."""
 GHOST: Colour = (232, 128, 150)
 POLYHEDRON: Colour = (240, 160, 30)
 POLYHEDRON_EDGE: Colour = (176, 102, 0)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from walking_irl.cpirl.summary import Recovery, noise_level, per_unit, volume_left
+from walking_irl.cpirl.summary import Summary, noise_level, per_unit, volume_left
 from walking_irl.recording.experiment import Experiment
 from walking_irl.recording.panels import panels
 from walking_irl.types import Status
@@ -14,9 +14,9 @@ from walking_irl.versions import versions
 
 
 def summary(
-    experiment: Experiment, found: Recovery | None, world: str, ending: str | None = None
+    experiment: Experiment, found: Summary | None, world: str, ending: str | None = None
 ) -> str:
-    """Markdown: what is shown, hidden and recovered weights, how sure they are, how to read it.
+    """Markdown: what is shown, true and recovered weights, how sure they are, how to read it.
 
     Args:
         experiment: The run.
@@ -24,8 +24,7 @@ def summary(
         world: What the world's view shows.
         ending: Why the run was cut short, or None.
     """
-    parts = [f"# What does the {experiment.domain} walk for?" if "humanoid" in experiment.domain
-             else f"# What does the expert of {experiment.domain} want?"]  # fmt: skip
+    parts = [f"# {experiment.question or f'What does the expert of {experiment.domain} want?'}"]
     if ending is not None:
         parts.append(f"**The run was cut short: {ending}.** What was done until then is here.")
     if found is not None:
@@ -37,25 +36,25 @@ def summary(
     return "\n\n".join(parts)
 
 
-def _result(experiment: Experiment, found: Recovery) -> str:
+def _result(experiment: Experiment, found: Summary) -> str:
     text = f"**{found.n_solves} iterations**: {found.status.value}."
     if found.status in (Status.DOMINATED, Status.MIXTURE_DOMINATES):
         return text + " No weights make this expert optimal; those below bring it nearest to it."
     if experiment.w_expert is not None:
         l1 = float(np.abs(found.w - experiment.w_expert).sum())
-        text += f" Hidden weights recovered to {l1:.4f} (sum of absolute errors)."
+        text += f" Ground-truth weights recovered to {l1:.4f} (sum of absolute errors)."
     return text
 
 
-def _table(experiment: Experiment, found: Recovery) -> str:
-    hidden = experiment.w_expert
-    head = ["objective", "hidden", "recovered", "interval"]
+def _table(experiment: Experiment, found: Summary) -> str:
+    w_expert = experiment.w_expert
+    head = ["objective", "ground truth", "recovered", "interval"]
     is_scaled = any(o.scale != 1.0 for o in experiment.objectives)
     if is_scaled:
         head.append("per raw unit")
     rows = [head, ["---"] * len(head)]
     for j, objective in enumerate(experiment.objectives):
-        truth = "?" if hidden is None else f"{hidden[j]:.4f}"
+        truth = "?" if w_expert is None else f"{w_expert[j]:.4f}"
         low, high = found.intervals[j]
         cells = [objective.name, truth, f"{found.w[j]:.4f}", f"{low:.4f} - {high:.4f}"]
         if is_scaled:
@@ -64,7 +63,7 @@ def _table(experiment: Experiment, found: Recovery) -> str:
     return "\n".join(f"| {' | '.join(cells)} |" for cells in rows)
 
 
-def _certainty(experiment: Experiment, found: Recovery) -> str:
+def _certainty(experiment: Experiment, found: Summary) -> str:
     low, high = found.bracket
     lines = [
         f"The weights shown: {found.rule}.",
@@ -88,8 +87,8 @@ def _legend(experiment: Experiment, world: str) -> str:
     lines = [
         "Play, or drag through `frame`: all views move together.",
         f"* **{'Left' if has_body else 'Above'}**: {world}." if world else "",
-        "* **Amber body**: all weights that still explain the expert; what the newest cut took "
-        "away glows **red**. The box below magnifies it."
+        "* **Amber polyhedron**: all weights that still explain the expert; what the newest cut "
+        "took away glows **red**. The box below magnifies it."
         if has_body
         else "* **Amber bars**: what is left of each weight's interval.",
         (
@@ -97,16 +96,14 @@ def _legend(experiment: Experiment, world: str) -> str:
             if experiment.others
             else "* **Blue** query, **green** estimate"
         )
-        + (", **red** hidden truth." if experiment.w_expert is not None else "."),
+        + (", **red** ground truth." if experiment.w_expert is not None else "."),
         "* **Certificate**: no matter which weights are true, a mixture of the policies found "
         "loses at most this much.",
     ]
     return "\n".join(text for text in lines if text)
 
 
-def properties(
-    experiment: Experiment, found: Recovery | None, ending: str | None
-) -> dict[str, Any]:
+def properties(experiment: Experiment, found: Summary | None, ending: str | None) -> dict[str, Any]:
     """Values of the property ``experiment``; what is not known is left out."""
     known: dict[str, Any] = {
         "domain": experiment.domain,

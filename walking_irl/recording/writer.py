@@ -11,17 +11,17 @@ import rerun as rr
 
 from walking_irl.cpirl.summary import summarise
 from walking_irl.errors import RecordingError
+from walking_irl.files import check_writable, write_file
 from walking_irl.recording.blueprint import blueprint, motion_blueprint
 from walking_irl.recording.experiment import Clock, Experiment, Other
-from walking_irl.recording.files import check_writable, write_atomically
 from walking_irl.recording.polyhedron_view import PolyhedronView
 from walking_irl.recording.progress_view import ProgressView
+from walking_irl.recording.reader import APPLICATION_ID
 from walking_irl.recording.style import PLAYBACK_RATE
 from walking_irl.recording.summary import properties, summary
 from walking_irl.recording.views.view import WorldView
 from walking_irl.types import Iteration
 
-APPLICATION_ID = "walking_irl"
 FLUSH_SECONDS = 60.0
 FRAMES_WITHOUT_WORLD = round(1.5 * PLAYBACK_RATE)
 
@@ -65,7 +65,7 @@ class Recorder(Generic[Motion]):
         experiment: Experiment,
         world: WorldView[Motion] | None = None,
     ) -> None:
-        self.path = check_writable(path)
+        self.path = check_writable(path, RecordingError)
         self.experiment = experiment
         self.world = world
         self._polyhedron = PolyhedronView(experiment)
@@ -136,7 +136,7 @@ class Recorder(Generic[Motion]):
         values = rr.AnyValues(**properties(e, found, ending))
         self._stream.send_property("experiment", values)
         self._stream.flush(timeout_sec=FLUSH_SECONDS)  # once: every chunk costs a kilobyte
-        write_atomically(self.path, self._memory.drain_as_bytes())
+        write_file(self.path, self._memory.drain_as_bytes(), RecordingError)
 
 
 def record_motion(
@@ -154,7 +154,7 @@ def record_motion(
     Raises:
         RecordingError: If ``path`` cannot be written, or Rerun is disabled.
     """
-    target = check_writable(path)
+    target = check_writable(path, RecordingError)
     stream, memory = open_stream()
     stream.send_blueprint(motion_blueprint(world))
     stream.send_recording_name(title)
@@ -163,7 +163,7 @@ def record_motion(
     markdown = rr.TextDocument(f"# {title}\n\n{text}", media_type=rr.MediaType.MARKDOWN)
     stream.log("summary", markdown, static=True)
     stream.flush(timeout_sec=FLUSH_SECONDS)
-    write_atomically(target, memory.drain_as_bytes())
+    write_file(target, memory.drain_as_bytes(), RecordingError)
     return target
 
 

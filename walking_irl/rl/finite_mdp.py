@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -80,6 +81,12 @@ class FiniteMDP:
     def n_objectives(self) -> int:
         """K."""
         return int(self.Phi.shape[1])
+
+    @cached_property
+    def dense(self) -> Array:
+        """T as one dense array (A, S, S): T[a, s, s'] is the probability of s' after a in s."""
+        T: Array = self.T.toarray().reshape(self.n_actions, self.n_states, self.n_states)
+        return T
 
     def reward(self, w: Array) -> Array:
         """r(s) = w.phi(s), shape (S,); any finite weights (K,), negative ones included."""

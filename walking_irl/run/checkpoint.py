@@ -7,55 +7,54 @@ from the file, and goes on where they end.
 
 from __future__ import annotations
 
-import io
 import json
-from collections.abc import Callable, Sequence
-from copy import copy
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 import numpy as np
 
 from walking_irl.arrays import Array
 from walking_irl.domains import load
-from walking_irl.domains.humanoid.gait.files import UNREADABLE
+from walking_irl.domains.contract import Demonstration, Domain, Truth, settings
 from walking_irl.errors import InvalidInputError
-from walking_irl.files import write_file
-from walking_irl.run.case import Setup, Subject
-from walking_irl.run.report import to_plain
-from walking_irl.types import Expert, Response
+from walking_irl.files import UNREADABLE, to_plain, write_arrays
+from walking_irl.run.setup import Setup
+from walking_irl.types import Expert, Forward, Response
 from walking_irl.versions import versions
 
 Answer = tuple[Array, Response]
 
-FORMAT = 1
+FORMAT = 2
+OLD_OPTIONS = ("population", "rollouts", "noise", "disturbance")
+"""Settings of format 1 that are now options of those domains that have them."""
 SAME = 1e-9
 """Largest difference of two weights that are one query."""
 
 
 @dataclass(frozen=True)
-class SavedRun:
+class Checkpoint:
     """What is needed to go on.
 
     Attributes:
         setup: What the run was asked to do.
-        subject: Its expert; without the recorded walks.
+        demonstration: Its expert; without the recorded trajectories.
         answers: Queries, shape (K,), and what the solver answered, in order.
     """
 
     setup: Setup
-    subject: Subject
+    demonstration: Demonstration
     answers: Sequence[Answer]
 
 
-class Remembering:
+class Replay:
     """A forward solver that does not solve again what is known.
 
     A solver with a memory of its own, ``recall(response)``, is told of what it did not solve.
     """
 
-    def __init__(self, forward: Callable[[Array], Response], answers: Sequence[Answer]) -> None:
+    def __init__(self, forward: Forward, answers: Sequence[Answer]) -> None:
         self.forward, self.answers = forward, answers
 
     def __call__(self, w: Array) -> Response:
@@ -68,14 +67,15 @@ class Remembering:
         return self.forward(w)
 
 
-def save_run(path: Path, run: SavedRun) -> None:
+def save_checkpoint(path: Path, run: Checkpoint) -> None:
     """Write a run.
 
     Raises:
         InvalidInputError: If the file cannot be written.
     """
-    domain, subject, expert = load(run.setup.domain), run.subject, run.subject.expert
-    setup = {k: v for k, v in asdict(run.setup).items() if k not in ("record", "archive")}
+    domain, shown = load(run.setup.domain), run.demonstration
+    expert, truth = shown.expert, shown.truth
+    setup = {k: v for k, v in asdict(run.setup).items() if k not in ("record", "checkpoint")}
     if run.setup.demonstration is not None:
         setup["demonstration"] = str(run.setup.demonstration)
     about = {
@@ -92,23 +92,20 @@ def save_run(path: Path, run: SavedRun) -> None:
         "expert_error": expert.error,
         "expert_covariance": expert.covariance,
         "demonstration": domain.pack(expert.demonstration),
-        "policy": domain.pack(subject.policy),
-        "w_expert": subject.w_expert,
-        "true_mu": subject.true_mu,
+        "policy": domain.pack(shown.policy),
+        "w_expert": None if truth is None else truth.w,
+        "true_mu": None if truth is None else truth.mu,
     }
     for i, (w, response) in enumerate(run.answers):
         arrays[f"w_{i}"], arrays[f"mu_{i}"] = w, response.mu
         arrays[f"policy_{i}"] = domain.pack(response.policy)
         arrays[f"sensitivity_{i}"] = response.sensitivity
         arrays[f"evaluated_{i}"] = response.evaluated
-    content = io.BytesIO()
-    known = {name: array for name, array in arrays.items() if array is not None}
-    np.savez_compressed(content, **known)
-    write_file(path, content.getvalue())
+    write_arrays(path, {name: array for name, array in arrays.items() if array is not None})
 
 
-def load_run(path: Path) -> SavedRun:
-    """Read a run that :func:`save_run` wrote.
+def load_checkpoint(path: Path) -> Checkpoint:
+    """Read a run that :func:`save_checkpoint` wrote.
 
     Raises:
         InvalidInputError: If there is no such file, or it holds something else.
@@ -124,16 +121,16 @@ def load_run(path: Path) -> SavedRun:
         return _unpacked(arrays)
     except (*UNREADABLE, IndexError, InvalidInputError) as error:
         raise InvalidInputError(
-            f"{path} is not a run that this version can resume ({error}); give the archive that "
+            f"{path} is not a run that this version can resume ({error}); give the checkpoint that "
             "walking-irl recover wrote beside its recording"
         ) from error
 
 
-def _unpacked(arrays: dict[str, Any]) -> SavedRun:
+def _unpacked(arrays: Mapping[str, Any]) -> Checkpoint:
     about = json.loads(str(arrays["about"]))
-    if about["format"] != FORMAT:
+    if about["format"] not in (1, FORMAT):
         raise InvalidInputError(f"its format is {about['format']}, expected {FORMAT}")
-    setup = _setup(about["setup"])
+    setup = _setup(about["setup"], about["format"])
     domain = load(setup.domain)
     K = len(domain.objectives)
     expert = Expert(
@@ -144,41 +141,46 @@ def _unpacked(arrays: dict[str, Any]) -> SavedRun:
         n_samples=int(about["n_samples"]),
         demonstration=domain.unpack(arrays["demonstration"]),
     )
-    w_expert, true_mu = (
-        _finite(arrays[name], K) if name in arrays else None for name in ("w_expert", "true_mu")
+    truth = None
+    if "w_expert" in arrays:
+        truth = Truth(_finite(arrays["w_expert"], K), _finite(arrays["true_mu"], K))
+    shown = Demonstration(expert, domain.unpack(arrays["policy"]), truth)
+    answers = [_answer(arrays, domain, i, info) for i, info in enumerate(about["info"])]
+    return Checkpoint(setup, shown, answers)
+
+
+def _answer(arrays: Mapping[str, Any], domain: Domain, i: int, info: dict[str, Any]) -> Answer:
+    K, sensitivity = len(domain.objectives), arrays.get(f"sensitivity_{i}")
+    response = Response(
+        policy=domain.unpack(arrays[f"policy_{i}"]),
+        mu=_finite(arrays[f"mu_{i}"], K),
+        sensitivity=None if sensitivity is None else _finite(sensitivity, K, K),
+        evaluated=_table(arrays[f"evaluated_{i}"], K),
+        info=info,
     )
-    subject = Subject(expert, domain.unpack(arrays["policy"]), w_expert, true_mu)
-    answers = [
-        (
-            _finite(arrays[f"w_{i}"], K),
-            Response(
-                policy=domain.unpack(arrays[f"policy_{i}"]),
-                mu=_finite(arrays[f"mu_{i}"], K),
-                sensitivity=_finite(arrays[f"sensitivity_{i}"], K, K)
-                if f"sensitivity_{i}" in arrays
-                else None,
-                evaluated=_table(arrays[f"evaluated_{i}"], K),
-                info=info,
-            ),
-        )
-        for i, info in enumerate(about["info"])
-    ]
-    return SavedRun(setup, subject, answers)
+    return _finite(arrays[f"w_{i}"], K), response
 
 
-def _setup(given: dict[str, Any]) -> Setup:
+def _setup(given: dict[str, Any], version: int) -> Setup:
+    if version == 1:  # all domains had the walker's options
+        known = load(given["domain"]).options
+        old = {name: given.pop(name) for name in OLD_OPTIONS if name in given}
+        given["options"] = {name: value for name, value in old.items() if name in known}
     unknown = given.keys() - {f.name for f in fields(Setup)}
     if unknown:
         raise InvalidInputError(f"unknown settings {', '.join(sorted(unknown))}")
-    given = copy(given)
     if given["weights"] is not None:
         given["weights"] = tuple(given["weights"])
     if given["demonstration"] is not None:
         given["demonstration"] = Path(given["demonstration"])
-    for name, usual in asdict(Setup()).items():
-        if type(usual) in (int, str) and type(given.get(name, usual)) is not type(usual):
-            raise InvalidInputError(f"its setting {name} is {given[name]!r}")
-    return Setup(**given)
+    for name, hint in get_type_hints(Setup).items():
+        if name in given and hint in (int, str, int | None):
+            value = given[name]
+            if not isinstance(value, hint) or isinstance(value, bool):
+                raise InvalidInputError(f"its setting {name} is {value!r}")
+    setup = Setup(**given)
+    settings(load(setup.domain).options, setup.options, setup.domain)
+    return setup
 
 
 def _finite(array: Array, *shape: int) -> Array:

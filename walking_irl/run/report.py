@@ -2,71 +2,61 @@
 
 from __future__ import annotations
 
-import json
-import math
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from walking_irl.arrays import Array
-from walking_irl.cpirl.summary import Recovery, summarise
+from walking_irl.cpirl.summary import Summary, summarise
 from walking_irl.errors import InvalidInputError, WalkingIRLError
-from walking_irl.files import write_file
+from walking_irl.run.problem import Problem
 from walking_irl.types import Expert, Iteration, Objective, Rule, Status
 from walking_irl.versions import versions
 
-SUCCESS = (
-    Status.MATCHED,
-    Status.CONVERGED,
-    Status.GAP_CLOSED,
-    Status.DOMINATED,
-    Status.MIXTURE_DOMINATES,
-)
-"""Endings that answer the question; any other leaves exit code 1."""
 INTERRUPTED = "interrupted"
 
 
 @dataclass
 class Report:
-    """Outcome of one recovery; hidden weights are known to it, never to the learner.
+    """Outcome of one recovery; ground-truth weights are known to it, never to the learner.
 
     Attributes:
-        domain: Name of the domain.
-        objectives: Its objectives.
-        centre: Key of the centre.
-        mode: Mode of CPIRL.
-        seed: Seed, or None where weights were given.
-        w_expert: Hidden weights, shape (K,), or None for a demonstration of unknown weights.
+        problem: What it worked on.
         iterations: All that CPIRL yielded.
-        expert: What the learner was told of the expert.
-        true_mu: Of the expert's optimal policy without noise, for scoring; or None.
         recovered_mu: Of the best policy for the recovered weights, for scoring; or None.
         seconds: Wall time by part [s].
         recording: Path of the recording, if there is one.
+        checkpoint: Path of the file that the run can be resumed from, if there is one.
         was_interrupted: Whether Ctrl-C ended it.
         failure: Why a solver ended it, or nothing.
-        archive: Path of the file that the run can be resumed from, if there is one.
-        failed_write: Why the recording or that file could not be written, or None.
+        failed_write: Why the recording or the checkpoint could not be written, or None.
     """
 
-    domain: str
-    objectives: tuple[Objective, ...]
-    centre: str
-    mode: str
-    seed: int | None
-    w_expert: Array | None
-    expert: Expert
-    true_mu: Array | None = None
+    problem: Problem
     iterations: list[Iteration] = field(default_factory=list)
     recovered_mu: Array | None = None
     seconds: dict[str, float] = field(default_factory=dict)
     recording: str | None = None
+    checkpoint: str | None = None
     was_interrupted: bool = False
     failure: str = ""
-    archive: str | None = None
     failed_write: WalkingIRLError | None = None
+
+    @property
+    def expert(self) -> Expert:
+        """What the learner was told of the expert."""
+        return self.problem.expert
+
+    @property
+    def objectives(self) -> tuple[Objective, ...]:
+        """The domain's objectives."""
+        return self.problem.objectives
+
+    @property
+    def w_expert(self) -> Array | None:
+        """Ground-truth weights, shape (K,), or None where nobody knows them."""
+        return self.problem.w_expert
 
     @property
     def last(self) -> Iteration:
@@ -80,7 +70,7 @@ class Report:
         return self.iterations[-1]
 
     @property
-    def recovery(self) -> Recovery:
+    def summary(self) -> Summary:
         """What was found, how sure it is, and what limits it."""
         return summarise(self.iterations, self.expert, self.objectives)
 
@@ -104,11 +94,11 @@ class Report:
     @property
     def is_success(self) -> bool:
         """Whether the run answers what the expert walks for."""
-        return not self.was_interrupted and not self.failure and self.ending in SUCCESS
+        return not self.was_interrupted and not self.failure and self.ending.is_success
 
     @property
     def contains_expert(self) -> bool | None:
-        """Whether the hidden weights lie inside the intervals."""
+        """Whether the ground-truth weights lie inside the intervals."""
         if self.w_expert is None:
             return None
         lower, upper = self.last.intervals.T
@@ -120,15 +110,13 @@ class Report:
         return None if self.w_expert is None else float(np.abs(self.w - self.w_expert).sum())
 
     def relative_loss(self, mu: Array | None) -> float | None:
-        """(J_E - J) / |J_E| of a policy under the hidden weights."""
-        if self.w_expert is None or self.true_mu is None or mu is None:
-            return None
-        J_E = float(self.w_expert @ self.true_mu)
-        return (J_E - float(self.w_expert @ mu)) / abs(J_E)
+        """(J_E - J) / |J_E| of a policy under the ground-truth weights; the recording's loss."""
+        truth = self.problem.demonstration.truth
+        return None if truth is None or mu is None else truth.relative_loss(mu)
 
     @property
     def solves_to_1pct(self) -> int | None:
-        """Forward solves until some policy found lost less than 1 % under the hidden weights."""
+        """Forward solves until some policy found lost less than 1 % under the true weights."""
         for it in self.iterations:
             loss = self.relative_loss(it.response.mu)
             if loss is not None and loss < 0.01:
@@ -137,13 +125,13 @@ class Report:
 
     def to_json(self) -> dict[str, Any]:
         """Everything as plain JSON types."""
-        last = self.last
+        setup, last = self.problem.setup, self.last
         return {
-            "domain": self.domain,
+            "domain": setup.domain,
             "objectives": [o.name for o in self.objectives],
-            "centre": self.centre,
-            "mode": self.mode,
-            "seed": self.seed,
+            "centre": setup.centre,
+            "mode": setup.mode,
+            "seed": setup.drawn_from,
             "w_expert": None if self.w_expert is None else self.w_expert.tolist(),
             "w": self.w.tolist(),
             "intervals": last.intervals.tolist(),
@@ -156,16 +144,28 @@ class Report:
             "probe_solves": sum(it.rule is Rule.PROBE for it in self.iterations),
             "solves_to_1pct": self.solves_to_1pct,
             "status": self.status,
-            "summary": _summary(self.recovery),
+            "summary": _summary(self.summary),
             "seconds": self.seconds,
             "history": [_entry(it) for it in self.iterations],
             "recording": self.recording,
-            "archive": self.archive,
+            "checkpoint": self.checkpoint,
             "versions": versions(),
         }
 
 
-def _summary(r: Recovery) -> dict[str, Any]:
+def progress_line(it: Iteration, report: Report) -> str:
+    """One line on an iteration, for a terminal."""
+    solver = it.response.info.get("iterations")
+    detail = f", {solver} solver iterations" if solver else ""
+    rule = f"{it.rule.name.lower():6s}"
+    scale = abs(float(it.w @ report.expert.mu))
+    return (
+        f"  {it.k + 1:3d} {rule}  regret {100 * it.regret / scale:9.5f} %  "
+        f"certificate {it.certificate:.1e}  widest interval {it.widest:.4f}{detail}"
+    )
+
+
+def _summary(r: Summary) -> dict[str, Any]:
     return {
         "rule": r.rule,
         "bracket": list(r.bracket),
@@ -190,23 +190,3 @@ def _entry(it: Iteration) -> dict[str, Any]:
         "estimate": it.estimate.tolist(),
         "solver": {k: v for k, v in it.response.info.items() if isinstance(v, int | float | str)},
     }
-
-
-def write_json(path: Path, content: dict[str, Any]) -> None:
-    """Write JSON; numbers that are not finite become null.
-
-    Raises:
-        InvalidInputError: If the file cannot be written.
-    """
-    write_file(path, (json.dumps(to_plain(content), indent=1, allow_nan=False) + "\n").encode())
-
-
-def to_plain(value: Any) -> Any:
-    """A value as JSON types; numbers that are not finite become None."""
-    if isinstance(value, dict):
-        return {str(k): to_plain(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [to_plain(v) for v in value]
-    if isinstance(value, np.ndarray | np.generic):
-        return to_plain(value.tolist())
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -6,13 +6,14 @@ import mujoco
 import numpy as np
 import pytest
 
-from walking_irl.domains.humanoid.body.anatomy import Walker, load_walker
+from walking_irl.domains.humanoid.body.anatomy import Walker
+from walking_irl.domains.humanoid.body.load import load_walker
 
 DYNAMIC = ("body_mass", "body_inertia", "body_ipos", "body_iquat", "body_pos")
 LOOK = ("geom_size", "geom_pos", "geom_quat", "geom_rgba", "geom_group", "geom_type")
 
 
-@pytest.fixture(params=[False, True], ids=["spatial", "planar"])
+@pytest.fixture(params=["humanoid", "humanoid-planar"])
 def walker(request: pytest.FixtureRequest) -> Walker:
     return load_walker(request.param)
 
@@ -89,7 +90,7 @@ def test_strengths_are_those_of_the_design_and_order_is_the_joints(walker):
 
 
 def test_planar_body_is_the_spatial_one_without_lateral_joints():
-    spatial, planar = load_walker(False).model, load_walker(True).model
+    spatial, planar = load_walker().model, load_walker("humanoid-planar").model
     for field in DYNAMIC:
         np.testing.assert_array_equal(getattr(spatial, field), getattr(planar, field), field)
     assert spatial.ngeom == planar.ngeom
@@ -99,8 +100,8 @@ def test_planar_body_is_the_spatial_one_without_lateral_joints():
         assert getattr(spatial.opt, field) == getattr(planar.opt, field)
     for field in ("geom_solref", "geom_solimp", "geom_friction", "geom_margin"):
         np.testing.assert_array_equal(getattr(spatial, field), getattr(planar, field), field)
-    assert set(load_walker(True).joints) < set(load_walker(False).joints)
-    for joint in load_walker(True).joints:
+    assert set(load_walker("humanoid-planar").joints) < set(load_walker().joints)
+    for joint in load_walker("humanoid-planar").joints:
         a, b = spatial.joint(joint), planar.joint(joint)
         np.testing.assert_array_equal(np.r_[a.axis, a.range], np.r_[b.axis, b.range])
         np.testing.assert_array_equal(

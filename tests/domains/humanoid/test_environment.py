@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from walking_irl.domains.humanoid.body.anatomy import load_walker
+from walking_irl.domains.humanoid.body.load import load_walker
 from walking_irl.domains.humanoid.closed_loop.environment import (
     Disturbance,
     Push,
@@ -12,12 +12,13 @@ from walking_irl.domains.humanoid.closed_loop.environment import (
 )
 from walking_irl.domains.humanoid.closed_loop.policy import tracking_policy
 from walking_irl.domains.humanoid.closed_loop.rollout import rollout
-from walking_irl.domains.humanoid.costs.objectives import REFERENCE_WEIGHTS, folded_costs
+from walking_irl.domains.humanoid.costs.defaults import REFERENCE_WEIGHTS
+from walking_irl.domains.humanoid.costs.stack import cost_stack
 from walking_irl.domains.humanoid.gait.library import load_gaits
 from walking_irl.errors import InvalidInputError
 
 
-@pytest.fixture(scope="module", params=[False, True], ids=["spatial", "planar"])
+@pytest.fixture(scope="module", params=["humanoid", "humanoid-planar"])
 def walking(request):
     walker = load_walker(request.param)
     gait = load_gaits(request.param)["reference"]
@@ -77,7 +78,7 @@ def test_mean_feature_over_a_cycle_is_mu(walking):
     second = slice(K + 1, 2 * K + 1)  # the reward of a step comes one step later
     recorded = rollout(walker, policy, cycles=2)
     cycle = type(recorded)(*(part[K : 2 * K + 1] for part in vars(recorded).values()))
-    mu = -folded_costs(walker, cycle, policy.timestep)
+    mu = -cost_stack(walker).rollout_costs(cycle, policy.timestep)
     np.testing.assert_allclose(np.mean(phi[second], 0), mu, rtol=1e-3)
     assert np.mean(rewards[second]) == pytest.approx(REFERENCE_WEIGHTS @ mu, rel=1e-3)
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from walking_irl.domains.humanoid import render
-from walking_irl.domains.humanoid.body.anatomy import load_walker
+from walking_irl.domains.humanoid.body.load import load_walker
+from walking_irl.domains.humanoid.gait import pictures
 from walking_irl.domains.humanoid.gait.gait import whole_cycle
 from walking_irl.domains.humanoid.gait.library import load_gaits
 from walking_irl.domains.humanoid.gait.pictures import (
@@ -23,9 +23,9 @@ from walking_irl.domains.humanoid.gait.pictures import (
 from walking_irl.errors import InvalidInputError, WalkingIRLError
 
 
-@pytest.mark.parametrize("planar", [False, True], ids=["spatial", "planar"])
-def test_strip_shows_eight_different_frames_of_a_walker_in_two_colours(planar, tmp_path):
-    walker, gait = load_walker(planar), load_gaits(planar)["reference"]
+@pytest.mark.parametrize("body", ["humanoid", "humanoid-planar"])
+def test_strip_shows_eight_different_frames_of_a_walker_in_two_colours(body, tmp_path):
+    walker, gait = load_walker(body), load_gaits(body)["reference"]
     path = tmp_path / "gait.png"
     picture = strip(walker, gait, height=130, width=70, path=path)
     assert picture.shape == (260, 560, 3) and picture.dtype == np.uint8
@@ -50,9 +50,9 @@ def test_camera_follows_the_walker():
 
 
 def test_drawn_legs_stay_apart():
-    for planar in (False, True):
-        for name, gait in load_gaits(planar).items():
-            assert drawn_leg_distance(load_walker(planar), gait) > 0.005, name
+    for body in ("humanoid", "humanoid-planar"):
+        for name, gait in load_gaits(body).items():
+            assert drawn_leg_distance(load_walker(body), gait) > 0.005, name
 
 
 def test_crossed_legs_are_seen_to_overlap():
@@ -66,9 +66,9 @@ def test_crossed_legs_are_seen_to_overlap():
 
 def test_shoes_stand_on_the_floor():
     """At every knot the lower shoe is within a few millimetres of the floor."""
-    for planar in (False, True):
-        for name, gait in load_gaits(planar).items():
-            heights = sole_heights(load_walker(planar), gait)
+    for body in ("humanoid", "humanoid-planar"):
+        for name, gait in load_gaits(body).items():
+            heights = sole_heights(load_walker(body), gait)
             assert heights.min() > -0.007 and heights.max() < 0.007, name
 
 
@@ -86,7 +86,7 @@ def test_pictures_need_no_screen_and_no_environment_variable():
     hidden = ("MUJOCO_GL", "DISPLAY", "WAYLAND_DISPLAY", "PYOPENGL_PLATFORM")
     bare = {k: v for k, v in os.environ.items() if k not in hidden}
     program = """
-from walking_irl.domains.humanoid.body.anatomy import load_walker
+from walking_irl.domains.humanoid.body.load import load_walker
 from walking_irl.domains.humanoid.gait.library import load_gaits
 from walking_irl.domains.humanoid.gait.pictures import strip
 print(strip(load_walker(), load_gaits()["reference"], height=20, width=10).std() > 1)
@@ -104,4 +104,4 @@ def test_impossible_sizes_are_refused():
         strip(walker, gait, height=0)
     with pytest.raises(InvalidInputError, match="too large"):
         strip(walker, gait, height=9000)
-    assert render.OVERSAMPLING >= 2
+    assert pictures.OVERSAMPLING >= 2

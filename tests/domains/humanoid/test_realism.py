@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from walking_irl.domains.humanoid.body.anatomy import load_walker
+from walking_irl.domains.humanoid.body.load import load_walker
 from walking_irl.domains.humanoid.gait.gait import Gait
 from walking_irl.domains.humanoid.gait.library import load_gaits
 from walking_irl.domains.humanoid.gait.norms import GROUPS, LATERAL, Band
@@ -53,7 +53,7 @@ def test_reference_outscores_a_gait_with_frozen_arms_and_stiff_knees():
 
 def test_metrics_cover_the_bands_and_nothing_else():
     assert set(metrics(gait_cycle(WALKER, REFERENCE))) == ALL_METRICS
-    planar = gait_cycle(load_walker(True), load_gaits(True)["reference"])
+    planar = gait_cycle(load_walker("humanoid-planar"), load_gaits("humanoid-planar")["reference"])
     assert set(metrics(planar)) == ALL_METRICS - set(LATERAL)
 
 

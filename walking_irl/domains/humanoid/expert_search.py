@@ -1,8 +1,11 @@
-"""The expert: the best gait for hidden weights, and what is recorded of it.
+"""The expert: the best gait for ground-truth weights, and what is recorded of it.
 
-The search for the gait is at least as hard as any learner's query: it starts from several gaits,
-shakes the best, takes two basins to the full root penalty, and finishes far below the learner's
-tolerance, also from the nudged starts that the learner uses.
+Newton's method finds the minimum of a basin at once, so the price is the search for the basin: from
+the known gaits that are cheapest under the weights, from the reference, and from hops off the
+best, all at a low root penalty; the best basins go to the full one. A still lower penalty first
+lets a gait leave its basin for a better one, or a worse one: both are tried. Detours over the
+optimal gaits of neighbouring weights then find what a learner would find. An optimum that is no
+smooth minimum sits on a contact jump: it is perturbed and solved again.
 """
 
 from __future__ import annotations
@@ -14,19 +17,31 @@ from dataclasses import dataclass
 import numpy as np
 
 from walking_irl.arrays import Array
-from walking_irl.domains.humanoid.gait.library import load_library
-from walking_irl.domains.humanoid.learner import NUDGE, check_weights, polish, run_tasks, solver_for
-from walking_irl.domains.humanoid.optimiser.solver import Solution, Stage, stage
+from walking_irl.domains.humanoid.learner import check_weights, known_gaits, polish, solver_for
+from walking_irl.domains.humanoid.optimiser.solver import Solution
+from walking_irl.domains.humanoid.optimiser.stages import Stage, stage
+from walking_irl.domains.humanoid.spec import WalkerSpec
+from walking_irl.workers import run_tasks
 
-SEARCH_PENALTY = 1e4
-CONTINUE = (stage(1e3, 60, 1e-5), stage(SEARCH_PENALTY, 100, 1e-6))
-DIRECTLY = (stage(SEARCH_PENALTY, 100, 1e-6),)
-RAISE = (stage(1e5, 60, 1e-5), stage(1e6, 150, 1e-6))
-FINISH = (stage(1e6, 100, 1e-8), stage(1e6, 120, 1e-11))
-APPROACH = (stage(SEARCH_PENALTY, 60, 1e-6), *RAISE)
+APPROACH = (stage(1e4, 25, 1e-5),)
+SOFTLY = (stage(1e3, 25, 1e-4), *APPROACH)
+"""From a gait of other weights, first through a penalty at which it may leave its basin."""
+FINISH = (stage(1e6, 60, 1e-11),)
+THERE, BACK = (stage(1e6, 15, 1e-4),), (stage(1e6, 25, 1e-6),)
+"""A detour to a gait of neighbouring weights, and back: roughly, only the best is finished."""
+NEAREST = 4
+"""Known gaits from which a search starts softly, the cheapest under the weights; the first of them
+and the reference also keep their basins."""
+HOPS = 2
 HOP = np.deg2rad(1.0)
-FINISH_SHAKES = ((0.0, NUDGE), *np.deg2rad([[0.1, 0.3], [0.3, 1.0], [0.1, 0.3]]).tolist())
-"""Amplitudes of the starts of the last solves, by round [rad]; the first is the learner's."""
+DETOUR = 0.1
+"""How far detours go towards each corner of the simplex."""
+MAX_DETOURS = 3
+"""Rounds of detours, as long as one finds a better gait."""
+BASINS = 3
+"""Most basins that are taken to the full root penalty."""
+FINISH_HOPS = tuple(np.deg2rad([[0.005, 0.1], [0.3, 1.0], [0.1, 0.3]]).tolist())
+"""Amplitudes of the perturbations of an optimum that is no smooth minimum, by round [rad]."""
 SAME_BASIN, RIVAL_BASIN = 2e-5, 5e-3
 """Relative cost differences below which gaits are the same, and above which a basin is lost."""
 SMOOTH = 1e-8
@@ -35,50 +50,66 @@ SMOOTH = 1e-8
 
 @dataclass(frozen=True)
 class OptimalGait:
-    """A gait, its folded costs and how it was found.
+    """A gait, its total costs and how it was found.
 
     Attributes:
         x: Gait vector.
-        folded: Folded costs G, shape (6,).
+        total_costs: Its total costs G, shape (K,).
         decrement: Undamped Newton decrement; above 1e-5 the optimum sits on a contact jump.
         starts: Solves of the whole search.
         iterations: Their iterations.
     """
 
     x: Array
-    folded: Array
+    total_costs: Array
     decrement: float
     starts: int
     iterations: int
 
 
+Job = tuple[Array, tuple[Stage, ...], Array | None]
+"""Start, stages, and multipliers of the root forces at the start."""
+
+
 class _Search:
     """Counts solves and keeps what they found."""
 
-    def __init__(self, planar: bool, w: Array, executor: Executor | None) -> None:
-        self.planar, self.w, self.executor = planar, w, executor
-        self.solver = solver_for(planar)
+    def __init__(self, spec: WalkerSpec, w: Array, executor: Executor | None) -> None:
+        self.spec, self.w, self.executor = spec, w, executor
+        self.solver = solver_for(spec)
         self.starts = self.iterations = 0
 
-    def run(self, jobs: Sequence[tuple[Array, tuple[Stage, ...]]]) -> list[Solution]:
-        tasks = [(self.planar, self.w, x, stages) for x, stages in jobs]
+    def run(self, jobs: Sequence[Job]) -> list[Solution]:
+        tasks = [(self.spec, self.w, *job) for job in jobs]
         found: list[Solution] = run_tasks(polish, tasks, self.executor)
         self.starts += len(found)
         self.iterations += sum(s.iterations for s in found)
         return found
 
+    def detours(self, s: Solution) -> list[Solution]:
+        """Solutions from the optimal gaits of weights nearer to each corner of the simplex."""
+        others = [self.w + DETOUR * (e - self.w) for e in np.eye(len(self.w))]
+        tasks = [(self.spec, self.w, other, s.x, s.root) for other in others]
+        found: list[Solution] = run_tasks(_detour, tasks, self.executor)
+        self.starts += 2 * len(found)
+        self.iterations += sum(f.iterations for f in found)
+        return found
+
     def search_cost(self, s: Solution) -> float:
-        return self.solver.problem.evaluate(s.x).total(self.w, DIRECTLY[0].penalty)
+        return self.solver.problem.evaluate(s.x).total(self.w, APPROACH[0].penalty)
 
     def cost(self, s: Solution) -> float:
-        return float(s.folded @ self.w)
+        return float(s.total_costs @ self.w)
 
     def decrement(self, s: Solution) -> float:
-        return self.solver.decrement(self.w, self.solver.linearise(s.x))
+        return self.solver.decrement(self.w, self.solver.linearise(s.x), s.root)
+
+    def hop(self, s: Solution, amplitude: float, rng: np.random.Generator) -> Array:
+        return self.solver.perturb(s.x, amplitude, rng)
 
 
 def best_gait(
-    planar: bool,
+    spec: WalkerSpec,
     w: Array,
     rng: np.random.Generator,
     executor: Executor | None = None,
@@ -87,55 +118,66 @@ def best_gait(
     """Search hard for the best gait under weights ``w``.
 
     Args:
-        planar: Which body.
-        w: Weights, shape (6,).
+        spec: Which body, and its costs.
+        w: Weights, shape (K,).
         rng: Source of the hops.
         executor: Runs independent solves side by side.
         also: Further gait vectors to start from.
     """
-    w = check_weights(w)
-    job = _Search(planar, w, executor)
-    shipped = list(load_library(planar).values())
-    near = sorted(shipped, key=lambda s: float(s.folded @ w))[:2]
-    reference = shipped[0].gait.to_vector()
-    starts = [(reference, CONTINUE), (reference, DIRECTLY)]
-    starts += [(s.gait.to_vector(), CONTINUE) for s in near]
-    starts += [(x, DIRECTLY) for x in also]
-    found = sorted(job.run(starts), key=job.search_cost)
-    hops = [(job.solver.shake(found[0].x, HOP, r), DIRECTLY) for r in rng.spawn(2)]
+    w = check_weights(w, spec)
+    job = _Search(spec, w, executor)
+    known = known_gaits(spec)
+    near = [s.x for s in sorted(known, key=lambda s: float(s.total_costs @ w))[:NEAREST]]
+    starts = [(x, SOFTLY) for x in near] + [(near[0], APPROACH), (known[0].x, APPROACH)]
+    jobs: list[Job] = [(x, stages, job.solver.dual(x)) for x, stages in starts]
+    found = sorted(job.run([*jobs, *((x, APPROACH, None) for x in also)]), key=job.search_cost)
+    hops: list[Job] = [(job.hop(found[0], HOP, r), APPROACH, None) for r in rng.spawn(HOPS)]
     found = sorted(found + job.run(hops), key=job.search_cost)
-    raised = job.run([(s.x, RAISE) for s in _basins(found, job)])
-    chosen = _finish(job, min(raised, key=job.cost), rng)
-    return OptimalGait(chosen.x, chosen.folded, job.decrement(chosen), job.starts, job.iterations)
+    raised = job.run([(s.x, FINISH, s.root) for s in _basins(found, job)])
+    for _ in range(MAX_DETOURS):
+        best = min(raised, key=job.cost)
+        other = min(job.detours(best), key=job.cost)
+        if not job.cost(other) < job.cost(best) * (1 - SAME_BASIN):
+            break
+        raised += job.run([(other.x, FINISH, other.root)])
+    chosen = _finish(job, raised, rng)
+    return OptimalGait(
+        chosen.x, chosen.total_costs, job.decrement(chosen), job.starts, job.iterations
+    )
 
 
-def _finish(job: _Search, best: Solution, rng: np.random.Generator) -> Solution:
-    """Solve tightly, from starts ever farther away, until the best gait is a smooth minimum.
+def _detour(spec: WalkerSpec, w: Array, other: Array, x: Array, root: Array | None) -> Solution:
+    """Best gait for ``w`` from that for other weights, as a function for a process pool."""
+    there = polish(spec, other, x, THERE, root)
+    back = polish(spec, w, there.x, BACK, there.root)
+    back.iterations += there.iterations
+    return back
+
+
+def _finish(job: _Search, found: list[Solution], rng: np.random.Generator) -> Solution:
+    """Perturb and solve again, ever farther away, until the best gait is a smooth minimum.
 
     A smooth gait is preferred to a cheaper one on a contact jump if it costs the same otherwise.
     """
-    found = [best]
-    for amplitudes in FINISH_SHAKES:
+    for amplitudes in (*FINISH_HOPS, ()):
         best = min(found, key=job.cost)
-        starts = [
-            job.solver.shake(best.x, a, r) for a, r in zip(amplitudes, rng.spawn(2), strict=True)
-        ]
-        found += job.run(
-            [
-                (x, APPROACH + FINISH if a > NUDGE else FINISH)
-                for a, x in zip(amplitudes, starts, strict=True)
-            ]
-        )
-        best = min(found, key=job.cost)
-        near = [s for s in found[1:] if job.cost(s) < job.cost(best) * (1 + SAME_BASIN)]
+        near = [s for s in found if job.cost(s) < job.cost(best) * (1 + SAME_BASIN)]
         smooth = [s for s in near if job.decrement(s) < SMOOTH]
         if smooth:
             return min(smooth, key=job.cost)
+        rngs = rng.spawn(len(amplitudes))
+        hops = [job.hop(best, a, r) for a, r in zip(amplitudes, rngs, strict=True)]
+        found = found + job.run([(x, (*APPROACH, *FINISH), None) for x in hops])
     return best
 
 
 def _basins(found: Sequence[Solution], job: _Search) -> list[Solution]:
-    """The best solution and the best of another basin that is nearly as good."""
-    best = job.search_cost(found[0])
-    rivals = [s for s in found[1:] if 1 + SAME_BASIN < job.search_cost(s) / best < 1 + RIVAL_BASIN]
-    return [found[0], *rivals[:1]]
+    """The best solution and the best of other basins that are nearly as good."""
+    basins = [found[0]]
+    for s in found[1:]:
+        ratio = job.search_cost(s) / job.search_cost(basins[-1])
+        if ratio > 1 + SAME_BASIN and job.search_cost(s) < job.search_cost(found[0]) * (
+            1 + RIVAL_BASIN
+        ):
+            basins.append(s)
+    return basins[:BASINS]

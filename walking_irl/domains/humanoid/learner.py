@@ -1,157 +1,209 @@
-"""The forward problem "best gait for weights w", from the shipped gaits or from a demonstration."""
+"""The forward problem "best gait for weights w", from known gaits or from a demonstration."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from concurrent.futures import Executor
+from dataclasses import replace
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from walking_irl.arrays import Array
-from walking_irl.domains.humanoid.body.anatomy import load_walker
-from walking_irl.domains.humanoid.costs.objectives import OBJECTIVES
+from walking_irl.domains.contract import OnStep
+from walking_irl.domains.humanoid.body.load import SHIPPED
+from walking_irl.domains.humanoid.costs.defaults import DEFAULT_COSTS
 from walking_irl.domains.humanoid.gait.gait import Gait
 from walking_irl.domains.humanoid.gait.library import load_library
-from walking_irl.domains.humanoid.optimiser.solver import (
-    DIRECT,
-    LADDER,
-    SMOOTH_DECREMENT,
-    GaitSolver,
-    Solution,
-    Stage,
-)
+from walking_irl.domains.humanoid.optimiser.newton import FAR, Status
+from walking_irl.domains.humanoid.optimiser.solver import SMOOTH_DECREMENT, GaitSolver, Solution
+from walking_irl.domains.humanoid.optimiser.stages import DIRECT, LADDER, Stage
 from walking_irl.domains.humanoid.optimiser.transcription import Transcription
-from walking_irl.errors import InvalidInputError, SolverError
+from walking_irl.domains.humanoid.spec import HUMANOID, WalkerSpec
+from walking_irl.domains.weights import normalised
+from walking_irl.errors import SolverError
 from walking_irl.types import Response
+from walking_irl.workers import run_tasks
 
-NUDGE = np.deg2rad(0.005)
-"""Learners start this far from the demonstration, so as not to sit on its contact jump."""
-ARCHIVE_TOL = 2e-5
+WORTH = 0.05
+"""Regret above which an answer's sensitivity is not worth its price."""
+SAME_COST = 2e-5
 """A solve that ends worse than a known gait by more than this is repeated from that gait."""
-CATALOGUE_STARTS = 3
+KNOWN_STARTS = 3
+
+
+class Start(NamedTuple):
+    """A known gait and its costs on the walker and under the costs that ask for it."""
+
+    x: Array
+    total_costs: Array
+    """G at full root penalty, shape (K,)."""
 
 
 @lru_cache
-def solver_for(planar: bool, threads: int = 1) -> GaitSolver:
-    """Solver of one body; one per process and number of threads."""
-    return GaitSolver(Transcription(load_walker(planar), threads=threads))
+def solver_for(spec: WalkerSpec = HUMANOID, threads: int = 1) -> GaitSolver:
+    """Solver of one body and its costs; one per process and number of threads."""
+    return GaitSolver(Transcription(spec.walker, spec.costs, threads=threads))
 
 
-def check_weights(w: Array) -> Array:
+@lru_cache
+def known_gaits(spec: WalkerSpec = HUMANOID) -> tuple[Start, ...]:
+    """Known gaits of a body, the reference first."""
+    library = load_library(spec.body).values()
+    if spec.body in SHIPPED and spec.costs == DEFAULT_COSTS:
+        return tuple(Start(g.gait.to_vector(), g.total_costs) for g in library)
+    problem = solver_for(spec).problem
+    vectors = [g.gait.to_vector() for g in library]
+    return tuple(Start(x, problem.evaluate(x).total_costs()) for x in vectors)
+
+
+def check_weights(w: Array, spec: WalkerSpec = HUMANOID) -> Array:
     """Weights as floats on the simplex.
 
     Raises:
         InvalidInputError: If they have another shape, or are negative, not finite or all zero.
     """
-    w = np.asarray(w, dtype=float)
-    names = ", ".join(o.name for o in OBJECTIVES)
-    if w.shape != (len(OBJECTIVES),):
-        raise InvalidInputError(f"expected {len(OBJECTIVES)} weights ({names}), got {w.size}")
-    if not np.isfinite(w).all() or (w < 0).any() or not w.any():
-        raise InvalidInputError(f"weights must be finite, >= 0 and not all zero, got {w.tolist()}")
-    w = w / w.max()  # against overflow
-    return np.asarray(w / w.sum())
+    return normalised(w, spec.stack.objectives)
 
 
-def polish(planar: bool, w: Array, x: Array, stages: Sequence[Stage]) -> Solution:
-    """One solve, as a function that a process pool can call."""
-    return solver_for(planar).solve(w, x, stages)
+def polish(
+    spec: WalkerSpec, w: Array, x: Array, stages: Sequence[Stage], root: Array | None = None
+) -> Solution:
+    """One solve, as a function that a process pool can call; see :meth:`.GaitSolver.solve`."""
+    return replace(solver_for(spec).solve(w, x, stages, root=root), model=None)
 
 
-def respond(solver: GaitSolver, w: Array, best: Solution, others: Iterable[Solution]) -> Response:
-    """The answer to a query: the best gait, and all gaits that were evaluated on the way."""
-    lin = solver.linearise(best.x)
-    decrement = solver.decrement(w, lin)
-    is_smooth = decrement < SMOOTH_DECREMENT
+def respond(
+    solver: GaitSolver,
+    w: Array,
+    best: Solution,
+    others: Iterable[Solution] = (),
+    is_wanted: bool = True,
+) -> Response:
+    """The answer to a query: the best gait, and all gaits that were evaluated on the way.
+
+    Its sensitivity comes along if it is wanted and the gait is a smooth minimum.
+    """
+    k = len(best.total_costs)
     everything = [best, *others]
-    passed = np.vstack([p for s in everything for p in (s.passed.reshape(-1, 6), s.folded)])
+    passed = np.vstack([p for s in everything for p in (s.passed.reshape(-1, k), s.total_costs)])
+    info = {
+        "iterations": sum(s.iterations for s in everything),
+        "starts": len(everything),
+        "status": best.status.name.lower(),
+        "is_stalled": best.status in (Status.STUCK, Status.CAPPED),
+    }
+    sensitivity = None
+    if is_wanted:
+        found = solver.sensitivity_of(w, best)
+        info["decrement"] = np.inf if found is None else found[2]
+        if found is not None and found[2] < SMOOTH_DECREMENT:
+            sensitivity = found[0]
     return Response(
         policy=Gait.from_vector(best.x, solver.problem.nv),
-        mu=-best.folded,
-        sensitivity=solver.sensitivity(w, lin)[0] if is_smooth else None,
+        mu=-best.total_costs,
+        sensitivity=sensitivity,
         evaluated=-passed,
-        info={
-            "iterations": sum(s.iterations for s in everything),
-            "starts": len(everything),
-            "decrement": decrement,
-            "root_residual": float(np.abs(lin.evaluation.root).max()),
-            "is_stalled": best.is_stalled,
-        },
+        info=info,
     )
 
 
 def search(
-    planar: bool, w: Array, executor: Executor | None = None, starts: int = CATALOGUE_STARTS
+    spec: WalkerSpec, w: Array, executor: Executor | None = None, starts: int = KNOWN_STARTS
 ) -> Response:
-    """Best gait for weights ``w`` over the shipped gaits that are cheapest under ``w``.
+    """Best gait for weights ``w`` over the known gaits that are cheapest under ``w``.
 
     Raises:
         SolverError: If the solver stalls from every start.
     """
-    w = check_weights(w)
-    library = sorted(load_library(planar).values(), key=lambda s: float(s.folded @ w))[:starts]
-    tasks = [(planar, w, s.gait.to_vector(), LADDER) for s in library]
-    solutions = run_tasks(polish, tasks, executor)
-    solutions.sort(key=lambda s: float(s.folded @ w))
-    if not np.isfinite(solutions[0].folded).all():
+    w = check_weights(w, spec)
+    near = sorted(known_gaits(spec), key=lambda s: float(s.total_costs @ w))[:starts]
+    dual = solver_for(spec).dual
+    solutions = run_tasks(polish, [(spec, w, s.x, LADDER, dual(s.x)) for s in near], executor)
+    solutions.sort(key=lambda s: float(s.total_costs @ w))
+    if not np.isfinite(solutions[0].total_costs).all():
         raise SolverError(f"no gait found for weights {w.round(4).tolist()} from {starts} starts")
-    return respond(solver_for(planar), w, solutions[0], solutions[1:])
+    return respond(solver_for(spec), w, solutions[0], solutions[1:])
 
 
-def run_tasks(function: Any, tasks: Sequence[tuple[Any, ...]], executor: Executor | None) -> Any:
-    """Results of ``function(*task)`` in order, side by side where there is an executor."""
-    if executor is None:
-        return [function(*task) for task in tasks]
-    return [f.result() for f in [executor.submit(function, *task) for task in tasks]]
-
-
-class Imitator:
+class WarmStartSolver:
     """The learner's forward solver: it sees a demonstrated gait and starts from there.
 
     Starting elsewhere may end in another basin than the expert's, whose worse gaits would not cut.
-    The answers depend on the queries so far only through an archive: a solve that ends worse than a
-    known gait is repeated from that gait.
+    A demonstration that no body could walk, like the mean of recorded cycles, is made physical
+    first. The answers depend on the queries so far only through the gaits found: a solve that ends
+    worse than a known gait is repeated from that gait.
 
     Args:
         demonstration: Demonstrated gait.
-        planar: Which body.
+        spec: Which body, and its costs.
         threads: Threads of one solve.
+        on_step: Told of every iteration of a solve in this process: its number and the cost.
+        mu: Demonstrated feature expectations, shape (K,); None: those of the gait itself.
+
+    Attributes:
+        start: Gait vector from which queries start.
+        demonstrated: Total costs G of the start, shape (K,).
+        known: Costs that an answer must beat to cut, -mu.
+        found: The answers so far.
     """
 
-    def __init__(self, demonstration: Gait, planar: bool = False, threads: int = 1) -> None:
-        self.planar, self.threads = planar, threads
-        self.start = demonstration.to_vector()
-        solver = solver_for(planar, threads)
-        self.demonstrated = solver.problem.evaluate(self.start).folded()
-        self.archive: list[tuple[Array, Array]] = []
+    def __init__(
+        self,
+        demonstration: Gait,
+        spec: WalkerSpec = HUMANOID,
+        threads: int = 1,
+        on_step: OnStep | None = None,
+        *,
+        mu: Array | None = None,
+    ) -> None:
+        self.spec, self.threads, self.on_step = spec, threads, on_step
+        solver, self.start = solver_for(spec, threads), demonstration.to_vector()
+        self.start = solver.physical(self.start)
+        self.demonstrated = solver.problem.evaluate(self.start).total_costs()
+        self.known = self.demonstrated if mu is None else -np.asarray(mu)
+        self.root = solver.dual(self.start)
+        self.found: list[Start] = []
 
     def __getstate__(self) -> dict[str, Any]:
-        """One thread in another process: a pool already uses the cores."""
-        return {**self.__dict__, "threads": 1}
+        """One thread in another process, unseen: a pool already uses the cores."""
+        return {**self.__dict__, "threads": 1, "on_step": None}
 
     def __call__(self, w: Array) -> Response:
         """Best gait for weights ``w`` near the demonstration."""
-        solver = solver_for(self.planar, self.threads)
-        seed = [int(v) for v in np.round(np.asarray(w) * 1e9)]
-        start = solver.shake(self.start, NUDGE, np.random.default_rng(seed))
-        solutions = [solver.solve(w, start, DIRECT)]
-        better = self._better_start(w, float(solutions[0].folded @ w))
+        solver = solver_for(self.spec, self.threads)
+        known = float(self.known @ w)
+        solutions = [self._solve(w, self.start, self.root, known)]
+        better = self._better_start(w, float(solutions[0].total_costs @ w), known)
         if better is not None:
-            solutions.append(solver.solve(w, better, DIRECT))
-        solutions.sort(key=lambda s: float(s.folded @ w))
+            solutions.append(self._solve(w, better, solver.dual(better), known))
+        solutions.sort(key=lambda s: float(s.total_costs @ w))
         best = solutions[0]
-        self.archive.append((best.x, best.folded))
-        return respond(solver, w, best, solutions[1:])
+        self.found.append(Start(best.x, best.total_costs))
+        cost = float(best.total_costs @ w)
+        if self.demonstrated @ w < cost * (1 - 1e-9):
+            best = Solution(
+                self.start,
+                self.demonstrated,
+                best.passed,
+                best.iterations,
+                Status.STUCK,
+                self.root,
+            )
+        return respond(solver, w, best, solutions[1:], known < cost * (1 + WORTH))
+
+    def _solve(self, w: Array, x: Array, root: Array | None, known: float) -> Solution:
+        solver = solver_for(self.spec, self.threads)
+        return solver.solve(w, x, DIRECT, known=known, root=root, on_step=self.on_step)
 
     def recall(self, response: Response) -> None:
         """Learn of an answer that another run has found."""
-        self.archive.append((response.policy.to_vector(), -response.mu))
+        self.found.append(Start(response.policy.to_vector(), -response.mu))
 
-    def _better_start(self, w: Array, cost: float) -> Array | None:
-        if self.demonstrated @ w < cost * (1 - 1e-9):
-            return self.start
-        known = [(float(g @ w), x) for x, g in self.archive]
-        best = min(known, key=lambda item: item[0], default=(np.inf, None))
-        return best[1] if best[0] < cost * (1 - ARCHIVE_TOL) else None
+    def _better_start(self, w: Array, cost: float, known: float) -> Array | None:
+        """A gait found before that is cheaper than a new answer, where the answer cuts little."""
+        best = min(self.found, key=lambda s: float(s.total_costs @ w), default=None)
+        if best is None or known > cost * (1 + FAR):
+            return None
+        return best.x if float(best.total_costs @ w) < cost * (1 - SAME_COST) else None

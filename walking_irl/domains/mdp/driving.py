@@ -81,6 +81,8 @@ class Driving(FiniteDomain):
         method: Forward solver, see :class:`FiniteDomain`.
     """
 
+    view = "driving"
+
     def __init__(self, method: str = "policy-iteration") -> None:
         Phi = _features()
         start = np.zeros(len(Phi))

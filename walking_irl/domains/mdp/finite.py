@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from walking_irl.arrays import Array
+from walking_irl.domains.contract import Defaults
+from walking_irl.domains.exact import ExactDomain
 from walking_irl.domains.weights import checked_weights
 from walking_irl.errors import InvalidInputError
 from walking_irl.rl.finite_mdp import Actions, FiniteMDP
@@ -17,7 +19,7 @@ DISTURBED = 0.25
 """Share of states in which a sub-optimal expert acts at random (our choice, as for the LQR)."""
 
 
-class FiniteDomain:
+class FiniteDomain(ExactDomain):
     """A finite MDP as a domain; policies are arrays of actions, shape (S,).
 
     Args:
@@ -26,6 +28,8 @@ class FiniteDomain:
         mdp: The world.
         method: Forward solver: "policy-iteration" (exact) or "value-iteration" (to 1e-9).
     """
+
+    defaults = Defaults(max_solves=100)  # milliseconds each; levels take up to 48 for 9 regions
 
     def __init__(
         self,
@@ -43,7 +47,7 @@ class FiniteDomain:
         return self.solve(checked_weights(w, len(self.objectives)))
 
     def solve(self, w: Array) -> Response:
-        """Best policy for any finite weights, negative ones included (Abbeel & Ng's rivals)."""
+        """Best policy for any finite weights, negative ones included (Abbeel & Ng 2004)."""
         solver = policy_iteration if self.method == METHODS[0] else value_iteration
         solution = solver(self.mdp, w)
         return Response(solution.pi, solution.mu, info={"iterations": solution.n_iter})
@@ -61,15 +65,3 @@ class FiniteDomain:
         pi[is_random] = rng.integers(self.mdp.n_actions, size=int(is_random.sum()))
         mu = self.mdp.feature_expectations(pi)
         return Expert(mu, np.zeros_like(mu), demonstration=pi)
-
-    def pack(self, policy: Actions) -> Actions:
-        """A policy as one array, for files: itself."""
-        return np.asarray(policy)
-
-    def unpack(self, packed: Actions) -> Actions:
-        """Inverse of :meth:`pack`."""
-        return packed
-
-    def random_weights(self, rng: np.random.Generator) -> Array:
-        """Hidden weights for experiments, uniform on the simplex, shape (K,)."""
-        return rng.dirichlet(np.ones(len(self.objectives)))

@@ -8,7 +8,9 @@ import numpy as np
 from scipy import sparse
 
 from walking_irl.arrays import Array, Indices
+from walking_irl.domains.contract import Option
 from walking_irl.domains.mdp.finite import FiniteDomain
+from walking_irl.domains.mdp.grid import grid_transitions
 from walking_irl.errors import InvalidInputError
 from walking_irl.rl.finite_mdp import Actions, FiniteMDP
 from walking_irl.types import Objective
@@ -19,6 +21,9 @@ SUCCESS = 0.7
 """Probability that an action is obeyed, else a uniformly random direction (Abbeel & Ng 2004)."""
 VARIANTS = ("patches", "macro")
 SIZES = (8, 64)
+OPTIONS = {
+    "population": Option("uniform", "how ground-truth weights are drawn", ("uniform", "sparse"))
+}
 
 
 class GridPicture(NamedTuple):
@@ -33,7 +38,7 @@ class GridPicture(NamedTuple):
 
 
 class Gridworld(FiniteDomain):
-    """A walk on size x size cells that collects the features of cells x cells regions.
+    """An agent on size x size cells that collects the features of cells x cells regions.
 
     In the "macro" variant the regions tile the grid, so that all features sum to a constant: the
     weights are then known only up to w -> a w + (1 - a)/K, and uniform weights explain every
@@ -48,6 +53,9 @@ class Gridworld(FiniteDomain):
         discount: gamma in [0, 1).
         method: Forward solver, see :class:`FiniteDomain`.
     """
+
+    options = OPTIONS
+    view = "gridworld"
 
     def __init__(
         self,
@@ -68,11 +76,14 @@ class Gridworld(FiniteDomain):
         name = "gridworld" if variant == "patches" else "gridworld-macro"
         super().__init__(name, _objectives(cells), mdp, method)
 
-    def random_weights(self, rng: np.random.Generator) -> Array:
-        """Sparse hidden weights: each non-zero with probability .3, at least two, uniform values.
+    def random_weights(self, population: str, rng: np.random.Generator) -> Array:
+        """Ground-truth weights, shape (K,).
 
-        Abbeel & Ng draw non-zeros with probability .1 for K = 64; .3 suits K = 9 and 16.
+        Sparse ones are non-zero with probability .3, at least two, with uniform values; Abbeel & Ng
+        draw non-zeros with probability .1 for K = 64, and .3 suits K = 9 and 16.
         """
+        if population != "sparse":
+            return super().random_weights(population, rng)
         share = 0.1 if self.cells >= 8 else 0.3
         while True:
             w = rng.random(self.cells**2) * (rng.random(self.cells**2) < share)
@@ -113,17 +124,8 @@ def _objectives(cells: int) -> tuple[Objective, ...]:
 
 
 def _transitions(size: int, success: float) -> sparse.csr_array:
-    """Sparse (4 * S, S): a step off the grid stays where it is."""
-    S = size**2
-    place = np.stack(np.divmod(np.arange(S), size), axis=1)
-    target = np.clip(place + MOVES[:, None], 0, size - 1) @ np.array([size, 1])  # (4, S)
-    blocks = []
-    for action in range(4):
-        p = np.full(4, (1 - success) / 4)
-        p[action] += success
-        rows, values = np.tile(np.arange(S), 4), np.repeat(p, S)
-        blocks.append(sparse.csr_array((values, (rows, target.ravel())), shape=(S, S)))
-    return sparse.vstack(blocks).tocsr()
+    """Sparse (4 * S, S): a move that is not obeyed goes any way, the chosen one included."""
+    return grid_transitions(size, MOVES, success * np.eye(4) + (1 - success) / 4)
 
 
 def _regions(size: int, cells: int, variant: str) -> Indices:

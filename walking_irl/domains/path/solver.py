@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import null_space
 from scipy.optimize import minimize
 
@@ -46,6 +47,22 @@ def jacobians(z: Array, goal: Array) -> tuple[Array, Array, Array, Array]:
     return costs(walks, goal)[0], walks.end[0] - target, J[:N_COSTS], J[N_COSTS:]
 
 
+def reduced_gradient(z: Array, goal: Array) -> Array:
+    """Gradient of each cost along the directions that keep the end conditions, shape (n, 5).
+
+    Controls at their bounds stay there.
+    """
+    _, _, J, E = jacobians(z, goal)
+    free = _free(z)
+    gradient: Array = (J[:, free] @ null_space(E[:, free])).T
+    return gradient
+
+
+def _free(z: Array) -> NDArray[np.bool_]:
+    lo, hi = _bounds(z.size)
+    return np.asarray((z > lo + AT_BOUND) & (z < hi - AT_BOUND))
+
+
 def hessian(z: Array, goal: Array, a: Array, multipliers: Array) -> Array:
     """Hessian (n, n) of a.F + multipliers.end, by central differences of its exact gradient."""
     n = z.size
@@ -64,7 +81,7 @@ def polished(a: Array, goal: Array, path: Path) -> Path:
     """
     z, unit = path.z.copy(), float(np.abs(a).max())
     lo, hi = _bounds(z.size)
-    free = (z > lo + AT_BOUND) & (z < hi - AT_BOUND)
+    free = _free(z)
     for _ in range(MAX_NEWTON):
         F, error, J, E = (
             part[..., free] if part.ndim == 2 else part for part in jacobians(z, goal)

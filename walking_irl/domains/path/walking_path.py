@@ -9,8 +9,17 @@ from typing import NamedTuple
 import numpy as np
 
 from walking_irl.arrays import Array
+from walking_irl.domains.contract import Option
+from walking_irl.domains.exact import ExactDomain
 from walking_irl.domains.path.model import costs, integrate
-from walking_irl.domains.path.solver import Path, bent_start, polished, slsqp_path, straight_start
+from walking_irl.domains.path.solver import (
+    Path,
+    bent_start,
+    polished,
+    reduced_gradient,
+    slsqp_path,
+    straight_start,
+)
 from walking_irl.domains.weights import checked_weights
 from walking_irl.errors import InvalidInputError, SolverError
 from walking_irl.types import Expert, Objective, Response
@@ -27,6 +36,9 @@ COARSE = 1e-6
 """Tolerance of SLSQP from which Newton's method takes over."""
 PERTURBATION = 0.25
 """Relative spread of a sub-optimal expert's weights from goal to goal (as for the LQR)."""
+OPTIONS = {
+    "population": Option("uniform", "how ground-truth weights are drawn", ("uniform", "interior"))
+}
 
 OBJECTIVES = tuple(
     Objective(name, unit, float(scale), meaning, formula)
@@ -57,7 +69,7 @@ class PathPicture(NamedTuple):
     """x [m], y [m], heading [rad] of each goal, shape (n, 3)."""
 
 
-class WalkingPath:
+class WalkingPath(ExactDomain):
     """A person walks from rest to goals at which it stands again; mu = -mean costs / scales.
 
     A policy is a tuple of paths, one for each goal. Every solve starts from standing still and
@@ -71,6 +83,8 @@ class WalkingPath:
 
     name = "walking-path"
     objectives: tuple[Objective, ...] = OBJECTIVES
+    options = OPTIONS
+    view = "walking-path"
 
     def __init__(
         self, goals: Sequence[tuple[float, float, float]] = GOALS, n_intervals: int = 20
@@ -115,10 +129,11 @@ class WalkingPath:
             sensitivity = -np.mean(parts, axis=0) / np.outer(SCALES, SCALES)
         return Response(paths, mu, sensitivity, info={"iterations": sum(p.n_iter for p in paths)})
 
-    def expert(self, w_E: Array, rng: np.random.Generator) -> Expert:
-        """Optimal expert with exact features; solved to rounding, as every query is."""
-        response = self.forward(w_E)
-        return Expert(response.mu, np.zeros(len(SCALES)), demonstration=response.policy)
+    def policy_gradient(self, policy: tuple[Path, ...]) -> Array:
+        """Gradient of each objective in the controls that its goal leaves free, shape (p, 5)."""
+        parts = [reduced_gradient(p.z, goal) for p, goal in zip(policy, self.goals, strict=True)]
+        G: Array = -np.concatenate(parts) / (len(parts) * SCALES)
+        return G
 
     def suboptimal_expert(self, w_E: Array, rng: np.random.Generator) -> Expert:
         """Expert whose weights differ from goal to goal: no single weights explain it."""
@@ -141,11 +156,14 @@ class WalkingPath:
             for z, goal in zip(packed, self.goals, strict=True)
         )
 
-    def random_weights(self, rng: np.random.Generator) -> Array:
-        """Hidden weights for experiments: half uniform weights, half uniform on the simplex.
+    def random_weights(self, population: str, rng: np.random.Generator) -> Array:
+        """Ground-truth weights, shape (5,).
 
-        Without the uniform half some accelerations would cost nothing and stick to their bounds.
+        Interior ones are half equal weights, half uniform on the simplex: without the equal half
+        some accelerations would cost nothing and stick to their bounds.
         """
+        if population != "interior":
+            return super().random_weights(population, rng)
         return 0.5 * rng.dirichlet(np.ones(len(SCALES))) + 0.5 / len(SCALES)
 
     def picture(self, policy: tuple[Path, ...]) -> PathPicture:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from walking_irl.errors import InvalidInputError
 from walking_irl.geometry.centres.analytic import analytic
-from walking_irl.geometry.centres.centre import Centre, CentreRule
+from walking_irl.geometry.centres.centre import Centre, CentreRule, OwnCentre, checked
 from walking_irl.geometry.centres.chebyshev import chebyshev
 from walking_irl.geometry.centres.ellipsoid import ellipsoid
 from walking_irl.geometry.centres.gravity import gravity
 
-__all__ = ["CENTRES", "Centre", "CentreRule", "centre_rule"]
+__all__ = ["CENTRES", "Centre", "CentreRule", "OwnCentre", "centre_rule"]
 
 CENTRES: dict[str, CentreRule] = {
     "ac": analytic,
@@ -19,8 +19,8 @@ CENTRES: dict[str, CentreRule] = {
 }
 
 
-def centre_rule(name: str) -> CentreRule:
-    """The rule of that name.
+def centre_rule(centre: str | CentreRule | OwnCentre) -> CentreRule:
+    """The rule of that name, or a function of one's own as such a rule.
 
     >>> centre_rule("acc")
     Traceback (most recent call last):
@@ -29,8 +29,10 @@ def centre_rule(name: str) -> CentreRule:
     Raises:
         InvalidInputError: If there is none.
     """
-    if name not in CENTRES:
+    if callable(centre):
+        return checked(centre)
+    if centre not in CENTRES:
         raise InvalidInputError(
-            f"unknown centre {name!r}; choose from {', '.join(sorted(CENTRES))}"
+            f"unknown centre {centre!r}; choose from {', '.join(sorted(CENTRES))}"
         )
-    return CENTRES[name]
+    return CENTRES[centre]

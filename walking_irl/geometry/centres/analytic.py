@@ -9,6 +9,7 @@ from scipy.linalg import solve_triangular
 
 from walking_irl.geometry.centres.centre import Centre, feasible_weights
 from walking_irl.geometry.polyhedron import WeightPolyhedron
+from walking_irl.geometry.rows import with_relevant
 
 
 def analytic(
@@ -34,10 +35,10 @@ def analytic(
         InvalidInputError: If ``most`` is negative.
     """
     if most is not None:
-        P = P.with_relevant(most)
+        P = with_relevant(P, most)
     z, R, used_slack = P.barrier
     m = len(used_slack)
     root = solve_triangular(R, np.eye(len(z)))
     # Rows left out of the barrier are satisfied, but may pass through its ellipsoid E(1).
-    inner = float(P.relevance().min())
+    inner = float(P.whitened.relevance().min())
     return Centre(feasible_weights(P, z), z, root @ root.T, min(1.0, inner), math.sqrt(m * (m - 1)))

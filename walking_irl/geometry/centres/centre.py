@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from walking_irl.arrays import Array
-from walking_irl.geometry.polyhedron import WeightPolyhedron, feasible
+from walking_irl.errors import InvalidInputError
+from walking_irl.geometry.plane import feasible
+from walking_irl.geometry.polyhedron import WeightPolyhedron
 
 
 class Centre(NamedTuple):
@@ -32,6 +35,38 @@ class CentreRule(Protocol):
     def __call__(self, P: WeightPolyhedron, *, rng: np.random.Generator) -> Centre:
         """Centre of ``P``; raises EmptyPolyhedronError where ``P`` is empty or flat."""
         ...
+
+
+class OwnCentre(Protocol):
+    """A centre of one's own: only asked where ``P`` has an interior, of which it returns a point.
+
+    >>> def middle(P, *, rng):
+    ...     return P.vertices().mean(axis=0)
+    """
+
+    def __call__(self, P: WeightPolyhedron, *, rng: np.random.Generator) -> Centre | Array:
+        """A point strictly inside ``P``, as a centre or as weights of shape (K,)."""
+        ...
+
+
+def checked(rule: OwnCentre) -> CentreRule:
+    """The rule with a named error where it is not a centre."""
+
+    def centre(P: WeightPolyhedron, *, rng: np.random.Generator) -> Centre:
+        P.chebyshev()  # raises where there is no interior
+        found = rule(P, rng=rng)
+        if isinstance(found, Centre):
+            return found
+        w = np.asarray(found, dtype=np.float64)
+        if w.shape != (P.n_objectives,) or not np.isfinite(w).all() or not P.contains(w):
+            raise InvalidInputError(
+                f"a centre must return {P.n_objectives} weights inside the polyhedron, got {found}"
+            )
+        z = P.to_plane(w)
+        radius = max(float(np.min(P.b - P.A @ z)), 0.0)
+        return Centre(feasible_weights(P, z), z, radius**2 * np.eye(len(z)), 1.0, math.inf)
+
+    return centre
 
 
 def feasible_weights(P: WeightPolyhedron, z: Array) -> Array:

@@ -16,10 +16,9 @@ from scipy.linalg import solve_triangular
 from walking_irl.arrays import Array
 from walking_irl.errors import SolverError
 from walking_irl.geometry.centres.centre import Centre, feasible_weights
-from walking_irl.geometry.halfspaces import whitened_rows
 from walking_irl.geometry.polyhedron import WeightPolyhedron
 
-GAP = 1e-9
+_GAP = 1e-9
 """Complementarity gap at which the interior-point method stops (of log det, per row)."""
 
 
@@ -47,11 +46,9 @@ def ellipsoid(P: WeightPolyhedron, *, rng: np.random.Generator | None = None) ->
         EmptyPolyhedronError: If the polyhedron is empty or flat.
         SolverError: If neither method finds an inscribed ellipsoid.
     """
-    centre = P.barrier
-    rows = whitened_rows(P.A, centre, P.b)
-    inscribed = _lazy_inscribed(rows)
-    z = centre.z + solve_triangular(centre.R, inscribed.centre)
-    half = solve_triangular(centre.R, np.linalg.cholesky(inscribed.square))
+    inscribed = _lazy_inscribed(P.whitened.rows)
+    z = P.whitened.to_plane(inscribed.centre)
+    half = solve_triangular(P.barrier.R, np.linalg.cholesky(inscribed.square))
     # Outer factor n, enlarged by the solver's relative error.
     return Centre(feasible_weights(P, z), z, half @ half.T, 1.0, len(z) * (1.0 + 1e-3))
 
@@ -121,10 +118,10 @@ def _interior_point(A: Array, max_iter: int = 100) -> Ellipsoid:
         Q = A @ square @ A.T
         h = np.sqrt(np.diagonal(Q))
         gap = float(y @ z) / m
-        mu = max(min(0.5, gap) * gap, 0.1 * GAP)
+        mu = max(min(0.5, gap) * gap, 0.1 * _GAP)
         r1, r2, r3 = -A.T @ (y * h), slack - h - z, mu - y * z
         residual = max(np.abs(r1).max(), np.abs(r2).max(), np.abs(r3).max())
-        if residual < GAP and gap < 10.0 * GAP:
+        if residual < _GAP and gap < 10.0 * _GAP:
             return Ellipsoid(x, np.asarray(square, dtype=np.float64))
         y2h, YA = 2.0 * y * h, y[:, None] * A
         YQ = y[:, None] * Q

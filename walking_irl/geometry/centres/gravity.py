@@ -11,10 +11,9 @@ from scipy.spatial import Delaunay, QhullError
 from walking_irl.arrays import Array
 from walking_irl.errors import InvalidInputError
 from walking_irl.geometry.centres.centre import Centre, feasible_weights
-from walking_irl.geometry.halfspaces import whitened_rows, whitened_vertices
 from walking_irl.geometry.polyhedron import WeightPolyhedron
 
-EXACT_OBJECTIVES = 5
+_EXACT_OBJECTIVES = 5
 """Largest number of objectives for which the centroid is exact (by triangulation)."""
 
 
@@ -40,16 +39,14 @@ def gravity(P: WeightPolyhedron, *, rng: np.random.Generator, n_samples: int = 4
     fewest = max(50, 2 * P.n_objectives)
     if n_samples < fewest:
         raise InvalidInputError(f"n_samples must be at least {fewest}, got {n_samples}")
-    centre = P.barrier
-    n = len(centre.z)
-    rows = whitened_rows(P.A, centre, P.b)
-    if n < EXACT_OBJECTIVES:
-        mean, covariance = _moments(whitened_vertices(rows))
+    n = P.n_objectives - 1
+    if n < _EXACT_OBJECTIVES:
+        mean, covariance = _moments(P.whitened.vertices())
     else:
-        samples = hit_and_run(rows, n_samples, rng)
+        samples = hit_and_run(P.whitened.rows, n_samples, rng)
         mean, covariance = samples.mean(axis=0), np.cov(samples.T)
-    z = centre.z + solve_triangular(centre.R, mean)
-    half = solve_triangular(centre.R, np.linalg.cholesky(covariance))
+    z = P.whitened.to_plane(mean)
+    half = solve_triangular(P.barrier.R, np.linalg.cholesky(covariance))
     inner, outer = math.sqrt((n + 2) / n), math.sqrt(n * (n + 2))
     return Centre(feasible_weights(P, z), z, half @ half.T, inner, outer)
 

@@ -130,8 +130,8 @@ class WalkerView:
         """One sentence for the summary."""
         ghost = " with the expert as a **red ghost**" if self.expert is not None else ""
         return (
-            f"the best walk for the weights queried{ghost}; they start each iteration together, "
-            "and orange arrows are forces of the ground"
+            f"the best gait for the weights queried{ghost}; they start each iteration together, "
+            "and orange arrows are ground reaction forces"
         )
 
     def _log_walker(

@@ -52,7 +52,7 @@ class GridworldView:
     def log_static(self, stream: rr.RecordingStream) -> None:
         """Log the expert's grids, and the names of all."""
         names = ["learner: queried reward, policy", "learner: visits"]
-        names += ["expert: visits", "expert: hidden reward, policy"][: 2 * self._has_expert]
+        names += ["expert: visits", "expert: true reward, policy"][: 2 * self._has_expert]
         at = np.array([[self._left(i) + self.size / 2, -2.1] for i in range(len(names))])
         stream.log("world/names", text_2d(at, names), static=True)
         if self.expert is not None:
@@ -109,7 +109,7 @@ class GridworldView:
         if not self._has_expert:
             return learner
         return (
-            f"{learner}; in red the expert's visits and beside them its hidden rewards and policy. "
+            f"{learner}; in red the expert's visits and beside them its true rewards and policy. "
             "Blue arrows go where the expert's do not"
         )
 

@@ -1,4 +1,4 @@
-"""Which view shows which of the small domains, and what of a policy it shows."""
+"""Which view shows which domain's policies, by the name that the domain gives (``Domain.view``)."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from walking_irl.arrays import Array
+from walking_irl.domains.contract import Demonstration
 from walking_irl.recording.views.view import WorldView
 
 
@@ -19,55 +20,73 @@ class World(NamedTuple):
     """Maps a policy, and the weights that it is the best for, to what the view shows of it."""
 
 
-def world_of(name: str, domain: Any, policy: Any = None, w_expert: Array | None = None) -> World:
-    """The world of a small domain.
+def world_of(domain: Any, shown: Demonstration | None = None) -> World | None:
+    """The world of a domain, or None where no view is registered for it.
 
     Args:
-        name: Its name in the registry of domains.
         domain: The domain.
-        policy: The expert's policy, for pictures only; or None.
-        w_expert: Hidden weights, for pictures only; or None.
+        shown: The expert, whose policy stands beside the learner's; None leaves it out.
     """
-    return WORLDS[name](domain, policy, w_expert)
+    make = VIEWS.get(domain.view)
+    return None if make is None else make(domain, shown)
 
 
-def _gridworld(domain: Any, policy: Any, w_expert: Array | None) -> World:
+def _walker(domain: Any, shown: Demonstration | None) -> World:
+    from walking_irl.recording.views.gait import WalkerView
+    from walking_irl.recording.views.motion import periodic_rollout
+
+    def motion(policy: Any, w: Array | None = None) -> Any:
+        return periodic_rollout(*domain.picture(policy))
+
+    ghost = None if shown is None else motion(shown.policy)
+    return World(WalkerView(domain.walker.model, ghost), motion)
+
+
+def _gridworld(domain: Any, shown: Demonstration | None) -> World:
     from walking_irl.recording.views.gridworld import GridMotion, GridworldView
 
     def motion(policy: Any, w: Array) -> GridMotion:
         return GridMotion(domain.picture(policy), w)
 
-    is_known = policy is not None and w_expert is not None
-    expert = motion(policy, w_expert) if is_known and w_expert is not None else None
+    expert = None
+    if shown is not None and shown.truth is not None:
+        expert = motion(shown.policy, shown.truth.w)
     return World(GridworldView(domain.size, expert), motion)
 
 
-def _lqr(domain: Any, policy: Any, w_expert: Array | None) -> World:
+def _lqr(domain: Any, shown: Demonstration | None) -> World:
     from walking_irl.recording.views.lqr import LQRView
 
     names = [o.name for o in domain.objectives]
-    expert = None if policy is None else domain.picture(policy)
-    return World(LQRView(names, expert), lambda policy, w: domain.picture(policy))
+    return World(LQRView(names, _picture(domain, shown)), _motion(domain))
 
 
-def _walking_path(domain: Any, policy: Any, w_expert: Array | None) -> World:
+def _walking_path(domain: Any, shown: Demonstration | None) -> World:
     from walking_irl.recording.views.path import PathView
 
-    expert = None if policy is None else domain.picture(policy)
-    return World(PathView(domain.goals, expert), lambda policy, w: domain.picture(policy))
+    return World(PathView(domain.goals, _picture(domain, shown)), _motion(domain))
 
 
-def _driving(domain: Any, policy: Any, w_expert: Array | None) -> World:
+def _driving(domain: Any, shown: Demonstration | None) -> World:
     from walking_irl.recording.views.driving import DrivingView
 
-    expert = None if policy is None else domain.picture(policy)
     road = domain.picture(np.zeros(domain.mdp.n_states, dtype=np.intp))
-    return World(DrivingView(road, expert), lambda policy, w: domain.picture(policy))
+    return World(DrivingView(road, _picture(domain, shown)), _motion(domain))
 
 
-WORLDS: dict[str, Callable[[Any, Any, Array | None], World]] = {
+def _picture(domain: Any, shown: Demonstration | None) -> Any:
+    return None if shown is None else domain.picture(shown.policy)
+
+
+def _motion(domain: Any) -> Callable[[Any, Array], Any]:
+    return lambda policy, w: domain.picture(policy)
+
+
+VIEWS: dict[str | None, Callable[[Any, Demonstration | None], World]] = {
+    "walker": _walker,
     "gridworld": _gridworld,
     "lqr": _lqr,
     "walking-path": _walking_path,
     "driving": _driving,
 }
+"""What makes each view; a domain of your own may add its own, or name one of these."""

@@ -1,7 +1,8 @@
-"""The walker's body, read from MJCF, and the linear map that swaps its sides.
+"""A walker's body and the linear map that swaps its sides.
 
 Mirroring at the sagittal plane turns a walk into a walk: joint positions map by ``mirror``, sensor
-readings by ``sensor_mirror``. Numbers of the body live in ``models/humanoid.xml`` only.
+readings by ``sensor_mirror``. Everything is read from the model by names of joints and sensors; the
+numbers of the shipped body live in ``models/humanoid.xml`` only.
 """
 
 from __future__ import annotations
@@ -9,13 +10,13 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from walking_irl.arrays import Array
-from walking_irl.files import model_path
 
 TORQUE_MARGIN = 1.5
 """Torques are clipped at this multiple of the strengths (the actuators' control range)."""
@@ -39,7 +40,8 @@ class Walker:
     """A walking body: the model and what the gait's mathematics needs to know of it.
 
     Attributes:
-        name: "humanoid" or "humanoid_planar".
+        body: What :func:`~.body.load.load_walker` loads it by: a shipped name, or a path.
+        name: Name of its model file, without ending.
         model: Shared MuJoCo model; copy it before you change its options.
         joints: Names of all joints, in the order of qpos and qvel.
         n_root: How many of the joints, the first ones, are unactuated (6, planar 3).
@@ -55,6 +57,7 @@ class Walker:
         sensor_advance: 1 where a sensor reads an x position, which moves on with the steps; (ns,).
     """
 
+    body: str
     name: str
     model: mujoco.MjModel
     joints: tuple[str, ...]
@@ -71,6 +74,19 @@ class Walker:
     sensor_advance: Array
 
     @property
+    def is_lateral(self) -> bool:
+        """Whether it can leave the sagittal plane."""
+        return "root_y" in self.joints
+
+    @cached_property
+    def reads_position(self) -> NDArray[np.bool_]:
+        """Whether a sensor's number is a coordinate of a point in the world, shape (ns,)."""
+        return np.repeat(
+            [_stem(name) in POSITION_SENSORS for name in self.sensor],
+            [rows.stop - rows.start for rows in self.sensor.values()],
+        )
+
+    @property
     def torque_mirror(self) -> Array:
         """Swaps the sides of joint torques, shape (nu, nu)."""
         return self.mirror[self.n_root :, self.n_root :]
@@ -82,15 +98,8 @@ class Walker:
         return model
 
 
-@lru_cache
-def load_walker(planar: bool = False) -> Walker:
-    """The humanoid, or its planar version.
-
-    >>> load_walker().joints[6]
-    'lumbar_flexion'
-    """
-    name = "humanoid_planar" if planar else "humanoid"
-    model = mujoco.MjModel.from_xml_path(str(model_path(f"{name}.xml")))
+def walker_of(model: mujoco.MjModel, body: str, name: str) -> Walker:
+    """The walker of a model; its joints and sensors must have the shipped bodies' names."""
     joints = tuple(model.joint(i).name for i in range(model.njnt))
     sensor = {
         model.sensor(i).name: slice(int(adr), int(adr + model.sensor_dim[i]))
@@ -99,6 +108,7 @@ def load_walker(planar: bool = False) -> Walker:
     limited = model.jnt_limited.astype(bool)
     mass = float(mujoco.mj_getTotalmass(model))
     return Walker(
+        body=body,
         name=name,
         model=model,
         joints=joints,
@@ -114,6 +124,18 @@ def load_walker(planar: bool = False) -> Walker:
         sensor_mirror=_constant(_sensor_mirror(sensor)),
         sensor_advance=_constant(_sensor_advance(sensor)),
     )
+
+
+def lowest_points(walker: Walker, q: Array) -> Array:
+    """Height of the lowest contact sphere in each posture (n, nv), shape (n,) [m]."""
+    model, data = walker.model, mujoco.MjData(walker.model)
+    spheres = np.nonzero(model.geom_conaffinity == 1)[0]
+    out = np.empty(len(q))
+    for k, row in enumerate(q):
+        data.qpos[:] = row
+        mujoco.mj_kinematics(model, data)
+        out[k] = np.min(data.geom_xpos[spheres, 2] - model.geom_size[spheres, 0])
+    return out
 
 
 def other_side(name: str) -> str:
@@ -151,9 +173,14 @@ def _sensor_mirror(sensor: Mapping[str, slice]) -> Array:
 def _sensor_advance(sensor: Mapping[str, slice]) -> Array:
     advance = np.zeros(_size(sensor))
     for name, rows in sensor.items():
-        if name.removesuffix("_r").removesuffix("_l") in POSITION_SENSORS:
+        if _stem(name) in POSITION_SENSORS:
             advance[rows.start] = 1
     return advance
+
+
+def _stem(name: str) -> str:
+    """Name without its side."""
+    return name.removesuffix("_r").removesuffix("_l")
 
 
 def _size(sensor: Mapping[str, slice]) -> int:

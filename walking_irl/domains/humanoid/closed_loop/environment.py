@@ -1,9 +1,8 @@
-"""The walker as a dm_control environment: torques in, observations and a reward out.
+"""The walker as a dm_control environment: torques in, observations and w.phi out.
 
 Y. Tassa et al. (2020), dm_control: Software and tasks for continuous control. A step of the
 environment holds the torques; its cost is known one step later, when the ground force at its end
-is, so the reward of a step belongs to the step before it. What the reward is and why it pays to
-walk: :mod:`walking_irl.domains.humanoid.closed_loop.progress`.
+is, so the reward of a step belongs to the step before it.
 """
 
 from __future__ import annotations
@@ -21,15 +20,10 @@ from walking_irl.arrays import Array, Indices
 from walking_irl.domains.humanoid.body.anatomy import Walker
 from walking_irl.domains.humanoid.body.physics import WalkerPhysics
 from walking_irl.domains.humanoid.closed_loop.progress import FALL_METRES, price_of_progress
-from walking_irl.domains.humanoid.costs.objectives import (
-    OBJECTIVES,
-    REFERENCE_SPEED,
-    Motion,
-    costs,
-    fixed_cost,
-    layout,
-    residuals,
-)
+from walking_irl.domains.humanoid.costs.base import REFERENCE_SPEED, Channels
+from walking_irl.domains.humanoid.costs.defaults import DEFAULT_COSTS, Costs
+from walking_irl.domains.humanoid.costs.stack import cost_stack
+from walking_irl.domains.humanoid.costs.time import Time
 from walking_irl.domains.humanoid.gait.gait import Gait, cycle_motion
 from walking_irl.errors import InvalidInputError
 
@@ -84,34 +78,13 @@ class Disturbance:
     push: Push | None = None
 
 
-class _Simulation(WalkerPhysics):
-    """The same simulation, whose steps check for trouble in a fifth of the time."""
-
-    def step(self, nstep: int = 1) -> None:
-        """Advance by ``nstep`` steps; raises PhysicsError where the state is no longer valid."""
-        if not self.legacy_step:
-            super().step(nstep)
-            return
-        model, data = self.model.ptr, self.data.ptr
-        warnings, before = self._warnings, self._warnings.tolist()
-        mujoco.mj_step2(model, data)
-        if nstep > 1:
-            mujoco.mj_step(model, data, nstep - 1)
-        mujoco.mj_step1(model, data)
-        after = warnings.tolist()
-        if after != before:  # let dm_control say what it is
-            warnings[:] = before
-            with self.check_invalid_state():
-                warnings[:] = after
-
-
-class Walk(control.Task):  # type: ignore[misc]
+class WalkTask(control.Task):  # type: ignore[misc]
     """Walk along a gait's phase without falling, for progress and low costs.
 
     Attributes:
         phi: Feature vector of the last complete step, shape (K,): its mean over a whole cycle at
             the gait's speed is mu.
-        costs: Folded costs of that step, shape (K,), if it is as long as the gait's.
+        costs: Total costs of that step, shape (K,), if it is as long as the gait's.
         progress: Length of that step, in steps of the gait's mean length.
         last: The last step, recorded.
         n_steps: Steps since the start of the episode.
@@ -127,9 +100,11 @@ class Walk(control.Task):  # type: ignore[misc]
         price: float = 0.0,
         steps_per_control: int = 1,
         disturbance: Disturbance | None = None,
+        costs: Costs = DEFAULT_COSTS,
     ) -> None:
         """Set up the task; without ``weights`` (K,) there is no reward, which saves its work."""
-        _check_weights(weights)
+        self.stack = cost_stack(walker, costs)
+        _check_weights(weights, len(self.stack.objectives))
         self.walker, self.start, self.random = walker, start, random
         self.weights, self.price = weights, price
         self.disturbance = disturbance or Disturbance()
@@ -137,12 +112,12 @@ class Walk(control.Task):  # type: ignore[misc]
         self.steps_per_cycle = round(start.period / self.control_timestep)
         self._forget()
         self._steps_per_control = steps_per_control
-        self._layout = layout(walker)
         stage = np.repeat(walker.model.sensor_needstage, walker.model.sensor_dim)
         self._late = _runs(np.flatnonzero(stage == mujoco.mjtStage.mjSTAGE_ACC))
         self._unit = np.ones(walker.model.nsensordata)  # of the sensors as they are observed
-        self._unit[self._layout.touch] = walker.weight
-        (self._touch,) = _runs(self._layout.touch)
+        touch = np.array([walker.sensor[f"touch_{side}"].start for side in "rl"])
+        self._unit[touch] = walker.weight
+        (self._touch,) = _runs(touch)
         angle = 2 * math.pi / self.steps_per_cycle * np.arange(self.steps_per_cycle)
         self._phases = np.column_stack([np.cos(angle), np.sin(angle)])
         self._height = walker.joints.index("root_z")
@@ -152,8 +127,9 @@ class Walk(control.Task):  # type: ignore[misc]
 
     def _forget(self) -> None:
         """Nothing has happened yet."""
+        K = len(self.stack.objectives)
         self.last: Step | None = None
-        self.phi, self.costs = np.zeros(len(OBJECTIVES)), np.zeros(len(OBJECTIVES))
+        self.phi, self.costs = np.zeros(K), np.zeros(K)
         self.progress, self.n_steps, self._pushing = 0.0, 0, False
 
     def initialize_episode(self, physics: WalkerPhysics) -> None:
@@ -242,24 +218,26 @@ class Walk(control.Task):  # type: ignore[misc]
         return specs.BoundedArray((len(joints),), float, lower, upper, name="\t".join(joints))
 
     def _evaluate(self, step: Step, after: Step) -> None:
-        motion = Motion(
+        channels = Channels(
             q=step.q[None],
             v=step.v[None],
             v_next=after.v[None],
             a=step.a[None],
             tau=step.u[None],
+            tau_next=after.u[None],
             s=step.sensors[None],
             s_next=after.sensors[None],
             h=self.control_timestep,
             distance=self.start.speed * self.control_timestep,
         )
-        r = residuals(self.walker, self._layout, motion)
-        self.costs = costs(r, motion.pace) + fixed_cost(r)
-        self.progress = float(after.q[0] - step.q[0]) / motion.distance
+        self.costs = self.stack.total_costs(channels)
+        self.progress = float(after.q[0] - step.q[0]) / channels.distance
         # Seconds per metre, linearised at the gait's speed: phi must feel a faster step.
         self.phi = -self.costs
-        pace = REFERENCE_SPEED / self.start.speed / OBJECTIVES[_TIME].scale
-        self.phi[_TIME] -= (1 - self.progress) * pace
+        for k, c in enumerate(self.stack.per_metre):
+            if isinstance(c, Time):
+                pace = REFERENCE_SPEED / self.start.speed / c.scale
+                self.phi[k] -= (1 - self.progress) * pace
 
     def _push(self, data: mujoco.MjData, push: Push) -> None:
         active = push.time <= data.time < push.time + PUSH_DURATION
@@ -272,14 +250,9 @@ class Walk(control.Task):  # type: ignore[misc]
         data.qvel[n:] += deviation * self.random.normal(size=len(self.walker.joints) - n)
 
 
-_TIME = [o.name for o in OBJECTIVES].index("time")
-
-
-def _check_weights(weights: Array | None) -> None:
-    if weights is not None and np.shape(weights) != (len(OBJECTIVES),):
-        raise InvalidInputError(
-            f"weights must have shape ({len(OBJECTIVES)},), got {np.shape(weights)}"
-        )
+def _check_weights(weights: Array | None, K: int) -> None:
+    if weights is not None and np.shape(weights) != (K,):
+        raise InvalidInputError(f"weights must have shape ({K},), got {np.shape(weights)}")
 
 
 def _runs(indices: Indices) -> list[slice]:
@@ -306,6 +279,7 @@ def environment(
     steps_per_control: int = 1,
     time_limit: float = float("inf"),
     disturbance: Disturbance | None = None,
+    costs: Costs = DEFAULT_COSTS,
 ) -> control.Environment:
     """A dm_control environment in which the walker walks.
 
@@ -315,17 +289,20 @@ def environment(
         rng: Source of the disturbances.
         weights: Of the reward, shape (K,); without them the reward is zero.
         price: Of a metre of progress, in units of w.costs per metre; 0 makes the reward w.phi. By
-            default that of the shipped gaits of this kind of body, at which walking pays.
+            default, for the shipped costs, that of the body's known gaits, at which walking pays;
+            0 for costs of your own.
         steps_per_control: Simulation steps for which an action is held.
         time_limit: End of an episode [s].
         disturbance: Noise, kicks and pushes.
+        costs: What the reward is made of.
     """
     if steps_per_control < 1:
         raise InvalidInputError(f"steps_per_control must be 1 or more, got {steps_per_control}")
-    _check_weights(weights)
+    _check_weights(weights, len(cost_stack(walker, costs).objectives))
     if price is None:
-        price = 0.0 if weights is None else price_of_progress(weights, walker.n_root == 3)
-    task = Walk(
+        is_known = weights is not None and tuple(costs) == tuple(DEFAULT_COSTS)
+        price = price_of_progress(np.asarray(weights), walker.body) if is_known else 0.0
+    task = WalkTask(
         walker,
         start,
         random=np.random.RandomState(rng.bit_generator),
@@ -333,6 +310,7 @@ def environment(
         price=price,
         steps_per_control=steps_per_control,
         disturbance=disturbance,
+        costs=costs,
     )
-    physics = _Simulation.of(walker, start.timestep)
+    physics = WalkerPhysics.of(walker, start.timestep)
     return control.Environment(physics, task, time_limit=time_limit, n_sub_steps=steps_per_control)

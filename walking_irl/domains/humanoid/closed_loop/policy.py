@@ -17,10 +17,11 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 import scipy.linalg as sl
-from scipy.interpolate import CubicSpline
 
 from walking_irl.arrays import Array
 from walking_irl.domains.humanoid.body.anatomy import Walker
+from walking_irl.domains.humanoid.body.physics import inverse_dynamics
+from walking_irl.domains.humanoid.gait.cycles import drifting_spline
 from walking_irl.domains.humanoid.gait.gait import Gait, cycle_motion
 from walking_irl.errors import InvalidInputError, SolverError
 
@@ -130,13 +131,9 @@ def tracking_policy(walker: Walker, gait: Gait, *, substeps: int = 1) -> Trackin
 def _reference(walker: Walker, gait: Gait, substeps: int) -> Reference:
     """The gait's states and torques on the grid of the simulation."""
     q, v, a = cycle_motion(gait, walker.mirror)
-    u = np.empty((len(q), walker.model.nu))
-    data = mujoco.MjData(walker.model)
-    for k in range(gait.n_knots):
-        data.qpos[:], data.qvel[:], data.qacc[:] = q[k], v[k], a[k]
-        mujoco.mj_inverse(walker.model, data)
-        u[k] = data.qfrc_inverse[walker.n_root :]
-    u[gait.n_knots :] = u[: gait.n_knots] @ walker.torque_mirror.T
+    half, _ = inverse_dynamics(walker, *(x[: gait.n_knots] for x in (q, v, a)))
+    u = half[:, walker.n_root :]
+    u = np.vstack([u, u @ walker.torque_mirror.T])
     return Reference(q, v, u) if substeps == 1 else _refine(gait, q, u, substeps)
 
 
@@ -144,12 +141,11 @@ def _refine(gait: Gait, q: Array, u: Array, substeps: int) -> Reference:
     """Periodic cubic splines through the knots, sampled ``substeps`` times as often."""
     drift = np.zeros(q.shape[1])
     drift[0] = gait.speed
-    knots = np.arange(len(q) + 1) * gait.timestep
-    steady = q - np.outer(knots[:-1], drift)
-    q_t = CubicSpline(knots, np.vstack([steady, steady[:1]]), bc_type="periodic")
-    u_t = CubicSpline(knots, np.vstack([u, u[:1]]), bc_type="periodic")
+    period = len(q) * gait.timestep
+    q_t = drifting_spline(q, period, drift)
+    u_t = drifting_spline(u, period, np.zeros(u.shape[1]))
     time = np.arange(len(q) * substeps) * gait.timestep / substeps
-    return Reference(q_t(time) + np.outer(time, drift), q_t(time, 1) + drift, u_t(time))
+    return Reference(q_t(time)[0], q_t(time)[1], u_t(time)[0])
 
 
 def _linearise(walker: Walker, reference: Reference, timestep: float) -> tuple[Array, Array]:

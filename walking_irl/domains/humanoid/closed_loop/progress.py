@@ -14,7 +14,7 @@ gait is still (to first order) the same one: it only walks a little faster.
 from __future__ import annotations
 
 from walking_irl.arrays import Array
-from walking_irl.domains.humanoid.gait.library import ShippedGait, load_library
+from walking_irl.domains.humanoid.gait.library import KnownGait, load_library
 
 MARGIN = 0.05
 """By how much a metre's price exceeds the least cost per metre known, relative. From about .1 on, a
@@ -23,14 +23,14 @@ FALL_METRES = 1.0
 """A fall takes back the price of so many metres: what is gained by pitching forward [m]."""
 
 
-def best_shipped(w: Array, planar: bool) -> ShippedGait:
-    """The shipped gait that costs least under weights ``w``, shape (6,)."""
-    return min(load_library(planar).values(), key=lambda s: float(w @ s.folded))
+def best_known(w: Array, body: str) -> KnownGait:
+    """The body's known gait that costs least under weights ``w``, shape (6,)."""
+    return min(load_library(body).values(), key=lambda s: float(w @ s.total_costs))
 
 
-def price_of_progress(w: Array, planar: bool) -> float:
+def price_of_progress(w: Array, body: str) -> float:
     """Price of a metre: MARGIN above the least cost per metre known for weights ``w`` (6,).
 
     For weights that no gait is shipped for, the shipped gaits bound their optimum from above.
     """
-    return (1.0 + MARGIN) * float(w @ best_shipped(w, planar).folded)
+    return (1.0 + MARGIN) * float(w @ best_known(w, body).total_costs)

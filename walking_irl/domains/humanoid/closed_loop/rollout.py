@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 from dm_control.rl.control import Environment, PhysicsError
 
-from walking_irl.arrays import Array
 from walking_irl.domains.humanoid.body.anatomy import Walker
 from walking_irl.domains.humanoid.closed_loop.environment import (
     Disturbance,
@@ -17,6 +16,7 @@ from walking_irl.domains.humanoid.closed_loop.environment import (
     environment,
 )
 from walking_irl.domains.humanoid.closed_loop.policy import TrackingPolicy
+from walking_irl.domains.humanoid.gait.cycles import mirror_average
 from walking_irl.domains.humanoid.gait.gait import Gait
 from walking_irl.errors import FallError, InvalidInputError
 from walking_irl.types import Rollout
@@ -86,9 +86,7 @@ def averaged_gait(
     skip: int = 2,
     substeps: int = 1,
 ) -> Gait:
-    r"""Mean gait of recorded walks: over cycles, and over the gait and its mirror image.
-
-    .. math:: \bar q_i = \tfrac12 (\hat q_i + S (\hat q_{i+N} - \bar L e_x)), \quad i < N
+    """Mean gait of recorded rollouts: over cycles, and over the gait and its mirror image.
 
     Args:
         walker: Who walked.
@@ -112,17 +110,8 @@ def averaged_gait(
             strides.append(walk.q[(c + 1) * K, 0] - walk.q[c * K, 0])
     if not pieces:
         raise InvalidInputError(f"no walk has more than {skip} whole gait cycles")
-    return _symmetric(walker, np.mean(pieces, 0), float(np.mean(strides)) / 2, policy.period / 2)
-
-
-def _symmetric(walker: Walker, q: Array, step_length: float, half_period: float) -> Gait:
-    """Mean of a whole cycle (2 N, nv) and its mirror image, from x = 0 on."""
-    n = len(q) // 2
-    second = q[n:].copy()
-    second[:, 0] -= step_length
-    half = (q[:n] + second @ walker.mirror.T) / 2
-    half[:, 0] -= half[0, 0]
-    return Gait(half, step_length, half_period)
+    step_length = float(np.mean(strides)) / 2
+    return mirror_average(walker, np.mean(pieces, 0), step_length, policy.period / 2)
 
 
 def _n_steps(policy: TrackingPolicy, cycles: int | None, seconds: float | None) -> int:

@@ -1,4 +1,4 @@
-"""How a walk is measured: closed-loop rollouts under a disturbance, averaged over gait cycles."""
+"""How a gait is measured: closed-loop rollouts under a disturbance, averaged over gait cycles."""
 
 from __future__ import annotations
 
@@ -10,14 +10,13 @@ from typing import NamedTuple
 import numpy as np
 
 from walking_irl.arrays import Array
-from walking_irl.domains.humanoid.body.anatomy import load_walker
 from walking_irl.domains.humanoid.closed_loop.policy import tracking_policy
 from walking_irl.domains.humanoid.closed_loop.rollout import rollout
-from walking_irl.domains.humanoid.costs.objectives import folded_costs
 from walking_irl.domains.humanoid.gait.gait import Gait
-from walking_irl.domains.humanoid.learner import run_tasks
+from walking_irl.domains.humanoid.spec import WalkerSpec
 from walking_irl.errors import InvalidInputError
 from walking_irl.types import Rollout
+from walking_irl.workers import run_tasks
 
 DISTURBANCES = ("initial", "kicks")
 MANY = 100
@@ -25,7 +24,7 @@ MANY = 100
 
 
 @dataclass(frozen=True)
-class Protocol:
+class Trials:
     """What is recorded of an expert.
 
     Attributes:
@@ -58,26 +57,26 @@ class Protocol:
 
 
 class Measurement(NamedTuple):
-    """Recorded walks and their folded costs per trajectory, shape (n, 6)."""
+    """Recorded rollouts and their total costs G, shape (n, K)."""
 
     rollouts: tuple[Rollout, ...]
-    folded: Array
+    total_costs: Array
 
     @property
     def mean(self) -> Array:
-        """Mean folded costs, shape (6,)."""
-        return np.asarray(self.folded.mean(axis=0))
+        """Mean total costs, shape (K,)."""
+        return np.asarray(self.total_costs.mean(axis=0))
 
     @property
     def covariance(self) -> Array:
-        """Covariance of the mean, shape (6, 6)."""
-        return np.asarray(np.cov(self.folded.T) / len(self.folded))
+        """Covariance of the mean, shape (K, K)."""
+        return np.asarray(np.cov(self.total_costs.T) / len(self.total_costs))
 
 
 def measure(
-    planar: bool,
+    spec: WalkerSpec,
     gait: Gait,
-    protocol: Protocol,
+    trials: Trials,
     rng: np.random.Generator,
     executor: Executor | None = None,
     parts: int = 2,
@@ -85,9 +84,9 @@ def measure(
     """Walk a gait in closed loop and measure it.
 
     Args:
-        planar: Which body.
+        spec: Which body, and its costs.
         gait: What to walk.
-        protocol: How often, under which disturbance.
+        trials: How often, under which disturbance.
         rng: Source of the disturbances.
         executor: Runs the trajectories side by side.
         parts: Tasks that they are divided into.
@@ -95,36 +94,36 @@ def measure(
     Raises:
         FallError: If the walker falls; no trajectory is left out silently.
     """
-    seeds = rng.integers(0, 2**63, size=protocol.rollouts)
+    seeds = rng.integers(0, 2**63, size=trials.rollouts)
     chunks = [c for c in np.array_split(seeds, parts if executor else 1) if len(c)]
-    tasks = [(planar, gait, protocol, c) for c in chunks]
+    tasks = [(spec, gait, trials, c) for c in chunks]
     results: list[tuple[list[Rollout], Array]] = run_tasks(walk, tasks, executor)
     walks = tuple(r for rollouts, _ in results for r in rollouts)
     return Measurement(walks, np.vstack([costs for _, costs in results]))
 
 
 def walk(
-    planar: bool, gait: Gait, protocol: Protocol, seeds: Sequence[int]
+    spec: WalkerSpec, gait: Gait, trials: Trials, seeds: Sequence[int]
 ) -> tuple[list[Rollout], Array]:
-    """Trajectories of one gait, one per seed, and their mean folded costs per cycle, (n, 6)."""
-    walker = load_walker(planar)
+    """Trajectories of one gait, one per seed, and their mean total costs per cycle, (n, K)."""
+    walker, stack = spec.walker, spec.stack
     policy = tracking_policy(walker, gait)
-    is_kicked = protocol.disturbance == "kicks"
+    is_kicked = trials.disturbance == "kicks"
     walks, costs = [], []
     for seed in seeds:
         walked = rollout(
             walker,
             policy,
-            cycles=protocol.skip + protocol.cycles,
+            cycles=trials.skip + trials.cycles,
             rng=np.random.default_rng(int(seed)),
-            velocity_noise=0.0 if is_kicked else protocol.noise,
-            kicks=protocol.noise if is_kicked else 0.0,
+            velocity_noise=0.0 if is_kicked else trials.noise,
+            kicks=trials.noise if is_kicked else 0.0,
         )
         walks.append(walked)
         steps = policy.steps_per_cycle
         cycles = [
-            folded_costs(walker, part(walked, c * steps, (c + 1) * steps + 1), policy.timestep)
-            for c in range(protocol.skip, protocol.skip + protocol.cycles)
+            stack.rollout_costs(part(walked, c * steps, (c + 1) * steps + 1), policy.timestep)
+            for c in range(trials.skip, trials.skip + trials.cycles)
         ]
         costs.append(np.mean(cycles, axis=0))
     return walks, np.array(costs)

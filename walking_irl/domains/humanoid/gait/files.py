@@ -8,18 +8,18 @@ from __future__ import annotations
 
 import csv
 import io
-import zlib
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from walking_irl.arrays import Array
 from walking_irl.domains.humanoid.body.anatomy import Walker
+from walking_irl.domains.humanoid.gait.cycles import mirror_average
 from walking_irl.domains.humanoid.gait.gait import Gait, whole_cycle
+from walking_irl.domains.humanoid.gait.phase import anchored_cycle
+from walking_irl.domains.humanoid.recorded.tables import read_table
 from walking_irl.errors import InvalidInputError
-from walking_irl.files import write_file
+from walking_irl.files import write_arrays, write_file
 
 N_KNOTS = 40
 LEAST_STEP = 0.05  # [m]
@@ -40,9 +40,7 @@ def save_gait(path: Path, gait: Gait, walker: Walker) -> None:
     }
     _check_ending(path)
     if path.suffix == ".npz":
-        packed = io.BytesIO()
-        np.savez_compressed(packed, **columns)
-        write_file(path, packed.getvalue())
+        write_arrays(path, columns)
     else:
         text = io.StringIO(newline="")
         writer = csv.writer(text)
@@ -59,7 +57,7 @@ def load_gait(path: Path, walker: Walker) -> Gait:
             length or not finite, or time steps are unequal, or the gait does not go forward.
     """
     _check_ending(path)
-    columns = _read(path)
+    columns = read_table(path).columns
     expected = ["time", *walker.joints]
     missing = [c for c in expected if c not in columns]
     unknown = [c for c in columns if c not in expected]
@@ -86,66 +84,23 @@ def load_gait(path: Path, walker: Walker) -> Gait:
 
 
 def _symmetric(q: Array, period: float, walker: Walker) -> Gait:
-    """Half a cycle of N_KNOTS knots from samples of a whole one."""
-    if len(q) % 2:
-        q = _resample(q, len(q) + 1)
-    n = len(q) // 2
-    length = float(np.mean(q[n:, 0] - q[:n, 0]))
-    if n != N_KNOTS:
-        q = _resample(q, 2 * N_KNOTS, 2 * length)
-    other = q[N_KNOTS:].copy()
-    other[:, 0] -= length
-    half = (q[:N_KNOTS] + other @ walker.mirror.T) / 2
-    half[:, 0] -= half[0, 0]
-    return Gait(half, length, period / 2)
+    """Half a cycle of N_KNOTS knots from samples of a whole one, wherever that starts."""
+    length = _step_length(q[:, 0])
+    q = anchored_cycle(walker, q, length, 2 * N_KNOTS)
+    return mirror_average(walker, q, length, period / 2)
 
 
-def _resample(q: Array, n: int, stride: float | None = None) -> Array:
-    """Periodic cubic splines through the samples, at ``n`` equal steps."""
-    m = len(q)
-    stride = (
-        stride if stride is not None else 2 * float(np.mean(q[m // 2 :, 0] - q[: m - m // 2, 0]))
-    )
-    drift = np.zeros(q.shape[1])
-    drift[0] = stride
-    phase = np.arange(m + 1) / m
-    steady = np.vstack([q - np.outer(phase[:-1], drift), q[:1]])
-    at = np.arange(n) / n
-    return np.asarray(CubicSpline(phase, steady, bc_type="periodic")(at) + np.outer(at, drift))
-
-
-UNREADABLE = (
-    OSError,
-    ValueError,
-    EOFError,
-    TypeError,
-    AttributeError,
-    KeyError,
-    NotImplementedError,
-    BadZipFile,
-    csv.Error,
-    zlib.error,
-)
-"""What NumPy and csv raise on files that they cannot read; an .npy named .npz is one of them."""
+def _step_length(x: Array) -> float:
+    """L of a symmetric walk, x(t + T) = x(t) + L, from equal samples of a cycle, shape (m,) [m]."""
+    m = len(x)
+    if m % 2 == 0:
+        return float(np.mean(x[m // 2 :] - x[: m // 2]))
+    phase = np.arange(m) / m
+    waves = [f(4 * np.pi * k * phase) for k in range(1, min(m // 4, 20)) for f in (np.cos, np.sin)]
+    columns = np.column_stack([2 * phase, np.ones(m), *waves])
+    return float(np.linalg.lstsq(columns, x, rcond=None)[0][0])
 
 
 def _check_ending(path: Path) -> None:
     if path.suffix not in (".npz", ".csv"):
         raise InvalidInputError(f"a gait file ends in .npz or .csv, got {path.name!r}")
-
-
-def _read(path: Path) -> dict[str, Array]:
-    try:
-        if path.suffix == ".npz":
-            with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
-                return {name: np.asarray(data[name], dtype=float).ravel() for name in data.files}
-        with path.open(newline="") as text:
-            names, *rows = [row for row in csv.reader(text) if row]
-        if len(set(names)) < len(names):
-            raise ValueError("a column appears twice")
-        table = np.array(rows, dtype=float).reshape(len(rows), -1)
-        return dict(zip(names, table.T, strict=True))
-    except FileNotFoundError as error:
-        raise InvalidInputError(f"there is no file {path}") from error
-    except UNREADABLE as error:
-        raise InvalidInputError(f"{path} is not a readable {path.suffix} table: {error}") from error

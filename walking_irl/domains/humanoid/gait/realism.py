@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import mujoco
 import numpy as np
 
 from walking_irl.arrays import Array
 from walking_irl.domains.humanoid.body.anatomy import Walker
+from walking_irl.domains.humanoid.body.physics import inverse_dynamics, passive_forces
+from walking_irl.domains.humanoid.gait.curves import gait_curves, likeness
 from walking_irl.domains.humanoid.gait.gait import Gait, cycle_motion
 from walking_irl.domains.humanoid.gait.norms import GROUPS
 from walking_irl.errors import InvalidInputError
@@ -28,7 +29,8 @@ class Cycle(NamedTuple):
     """One gait cycle from initial contact of the right foot, sampled at n knots.
 
     Shapes: q, v (n, nv), tau (n, nu), sensors (n, ns), force (n, 2) of the right and left foot
-    [body weights], root (n, n_root) [N, Nm]: what would have to hold the root.
+    [body weights], root (n, n_root) [N, Nm]: what would have to hold the root, passive (n, nu)
+    [Nm]: torques of the joints' springs and dampers.
     """
 
     walker: Walker
@@ -39,6 +41,7 @@ class Cycle(NamedTuple):
     sensors: Array
     force: Array
     root: Array
+    passive: Array
 
     def degrees(self, joint: str) -> Array:
         """A joint's angle [deg], shape (n,)."""
@@ -48,13 +51,27 @@ class Cycle(NamedTuple):
         """A joint's torque [Nm], shape (n,)."""
         return self.tau[:, self.walker.joints.index(joint) - self.walker.n_root]
 
+    def net_torque(self, joint: str) -> Array:
+        """A joint's torque with its springs and dampers, as laboratories measure it [Nm], (n,)."""
+        return self.net[:, self.walker.joints.index(joint) - self.walker.n_root]
+
+    @property
+    def net(self) -> Array:
+        """Net torques of all joints [Nm], shape (n, nu)."""
+        return self.tau + self.passive
+
     def sensor(self, name: str) -> Array:
         """A sensor's readings, shape (n, its size)."""
         return self.sensors[:, self.walker.sensor[name]]
 
     @property
     def power(self) -> Array:
-        """Power of each joint [W], shape (n, nu)."""
+        """Net power of each joint [W], shape (n, nu)."""
+        return self.net * self.v[:, self.walker.n_root :]
+
+    @property
+    def motor_power(self) -> Array:
+        """Power of each motor [W], shape (n, nu)."""
         return self.tau * self.v[:, self.walker.n_root :]
 
     @property
@@ -75,20 +92,15 @@ def gait_cycle(walker: Walker, gait: Gait) -> Cycle:
         InvalidInputError: If the right foot never touches down: then there is no cycle to speak of.
     """
     q, v, a = cycle_motion(gait, walker.mirror)
-    force = np.empty_like(q)
-    sensors = np.empty((len(q), walker.model.nsensordata))
-    data = mujoco.MjData(walker.model)
-    for k in range(len(q)):
-        data.qpos[:], data.qvel[:], data.qacc[:] = q[k], v[k], a[k]
-        mujoco.mj_inverse(walker.model, data)
-        force[k], sensors[k] = data.qfrc_inverse, data.sensordata
+    force, sensors = inverse_dynamics(walker, q, v, a)
     touch = np.hstack([sensors[:, walker.sensor[f"touch_{s}"]] for s in "rl"]) / walker.weight
     k0 = _touch_down(touch[:, 0])
     q[:k0, 0] += 2 * gait.step_length
     sensors[:k0] += 2 * gait.step_length * walker.sensor_advance
     q, v, force, sensors, touch = (np.roll(x, -k0, 0) for x in (q, v, force, sensors, touch))
     n = walker.n_root
-    return Cycle(walker, gait, q, v, force[:, n:], sensors, touch, force[:, :n])
+    passive = passive_forces(walker, q, v)[:, n:]
+    return Cycle(walker, gait, q, v, force[:, n:], sensors, touch, force[:, :n], passive)
 
 
 def _touch_down(force: Array) -> int:
@@ -127,10 +139,22 @@ def score(measured: dict[str, float]) -> float:
     return float(np.mean(list(group_scores(measured).values())))
 
 
+def bands_met(measured: dict[str, float]) -> dict[str, bool]:
+    """Whether each metric lies in its band."""
+    bands = {name: band for group in GROUPS.values() for name, band in group.items()}
+    return {m: bool(bands[m].low <= v <= bands[m].high) for m, v in measured.items()}
+
+
+def leg_length(walker: Walker) -> float:
+    """Height of the hips of the upright model [m]."""
+    return float(walker.model.body("pelvis").pos[2])
+
+
 def figures(walker: Walker, gait: Gait) -> dict[str, Any]:
     """What ``walking-irl gait --json`` tells of a gait.
 
-    The cost of transport is mechanical: all joints' work, of either sign, per weight and distance.
+    The cost of transport is mechanical: all motors' work, of either sign, per weight and distance.
+    Moments and powers of the metrics and curves are net: motor and passive, as they are measured.
     """
     cycle = gait_cycle(walker, gait)
     measured = metrics(cycle)
@@ -145,13 +169,15 @@ def figures(walker: Walker, gait: Gait) -> dict[str, Any]:
             j: [float(cycle.degrees(j).min()), float(cycle.degrees(j).max())] for j in hinges
         },
         "cost_of_transport": float(
-            np.abs(cycle.power).sum(1).mean() / (walker.mass * GRAVITY * gait.speed)
+            np.abs(cycle.motor_power).sum(1).mean() / (walker.mass * GRAVITY * gait.speed)
         ),
         "peak_vertical_force": float(cycle.force.max()),
         "max_root_residual": float(np.abs(root).max()),
         "metrics": measured,
         "groups": group_scores(measured),
         "realism": score(measured),
+        "bands": bands_met(measured),
+        "norms": likeness(gait_curves(cycle), gait.speed, leg_length(walker)),
     }
 
 
@@ -184,7 +210,7 @@ def _vertical_force(c: Cycle) -> dict[str, float]:
 def _centre_of_mass(c: Cycle) -> dict[str, float]:
     com = c.sensor("com")
     out: dict[str, float] = {"com_vertical": np.ptp(com[:, 2])}
-    if c.walker.n_root == 6:
+    if c.walker.is_lateral:
         right, left = (
             c.sensor(f"ankle_{s}")[c.force[:, i] > LOADED, 1] for i, s in enumerate("rl")
         )
@@ -228,7 +254,7 @@ def _upper_body(c: Cycle) -> dict[str, float]:
         "arm_antiphase": np.corrcoef(shoulder, c.degrees("hip_flexion_l"))[0, 1],
         "trunk_pitch": np.ptp(trunk[:, 0]),
     }
-    if c.walker.n_root == 6:
+    if c.walker.is_lateral:
         out["trunk_roll"] = np.ptp(trunk[:, 1])
         out["pelvis_yaw"] = np.ptp(c.degrees("root_yaw"))
         out["pelvis_list"] = np.ptp(c.degrees("root_roll"))
@@ -239,6 +265,6 @@ def _energy(c: Cycle) -> dict[str, float]:
     mass, ankle = c.walker.mass, c.walker.joints.index("ankle_r") - c.walker.n_root
     return {
         "ankle_power": c.power[:, ankle].max() / mass,
-        "ankle_moment": -c.tau[:, ankle].min() / mass,
+        "ankle_moment": -c.net[:, ankle].min() / mass,
         "positive_work": np.maximum(c.power, 0).sum(1).mean() / mass / c.gait.speed,
     }

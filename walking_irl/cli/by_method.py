@@ -1,0 +1,106 @@
+"""``walking-irl recover --method NAME``: a recovery by another method than CPIRL."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from walking_irl.cli import DONE
+from walking_irl.errors import InvalidInputError
+from walking_irl.files import check_outputs, write_json
+from walking_irl.run.by_method import HORIZON, TRAJECTORIES, MethodReport, recover_by
+from walking_irl.run.setup import Setup
+from walking_irl.workers import workers
+
+CPIRL_ONLY = ("centre", "mode", "max_solves")
+"""Settings of a recovery that are CPIRL's own."""
+
+
+def add_arguments(p: argparse.ArgumentParser) -> None:
+    """Arguments that choose another method."""
+    group = p.add_argument_group("another method", "they list themselves: walking-irl methods")
+    group.add_argument("--method", metavar="NAME", help="explain the expert by it; no recording")
+    group.add_argument(
+        "--trajectories",
+        type=int,
+        metavar="N",
+        help=f"demonstrations in finite worlds ({TRAJECTORIES} where a method reads actions)",
+    )
+    group.add_argument("--horizon", type=int, help=f"steps of each ({HORIZON})")
+
+
+def refuse_alone(args: argparse.Namespace) -> None:
+    """Complain about arguments that need ``--method``.
+
+    Raises:
+        InvalidInputError: If one is given without it.
+    """
+    for name in ("trajectories", "horizon"):
+        if getattr(args, name) is not None:
+            raise InvalidInputError(f"--{name} goes with --method")
+
+
+def run(args: argparse.Namespace, given: dict[str, Any], console: Console) -> int:
+    """The recovery; ``given`` are the arguments of its setup."""
+    own = [f"--{name.replace('_', '-')}" for name in CPIRL_ONLY if hasattr(args, name)]
+    own += ["--resume"] if args.resume is not None else []
+    own += ["--checkpoint"] if args.checkpoint is not None else []
+    own += ["--archive"] if args.archive is not None else []
+    if own:
+        raise InvalidInputError(f"{', '.join(own)}: CPIRL only, leave out with --method")
+    check_outputs([args.json], inputs=[given.get("demonstration")])
+    horizon = HORIZON if args.horizon is None else args.horizon
+    with workers() as executor:
+        report = recover_by(
+            args.method,
+            Setup(**given),
+            n_trajectories=args.trajectories,
+            horizon=horizon,
+            executor=executor,
+        )
+    if args.json is not None:
+        write_json(args.json, report.to_json())
+    show(report, console)
+    return DONE
+
+
+def show(report: MethodReport, console: Console) -> None:
+    """Print the table of weights, where there are some, and the figures below it."""
+    w, truth, intervals = report.weights, report.problem.w_expert, report.intervals
+    if w is not None:
+        table = Table("objective", title=f"{report.problem.domain.question} By {report.method}")
+        columns = [("ground truth", truth), ("recovered", w), ("interval", intervals)]
+        for name, values in columns:
+            if values is not None:
+                table.add_column(name, justify="right")
+        for j, objective in enumerate(report.problem.objectives):
+            cells = [_cell(values[j]) for _, values in columns if values is not None]
+            table.add_row(objective.name, *cells)
+        console.print(table)
+        if report.found.space != "simplex":
+            console.print("weights are scaled to sum |w| = 1; the method bounds no signs")
+    else:
+        console.print("no weights: this method answers with a policy or a reward for each state")
+    console.print(f"ended: {report.found.status.value}")
+    seen = f"{report.n_trajectories} trajectories" if report.n_trajectories else "itself"
+    console.print(f"the expert is known by {seen}")
+    if report.relative_loss is not None:
+        console.print(
+            "loss of the recovered policy, ground-truth weights: "
+            f"{100 * report.relative_loss:.5f} %"
+        )
+    solves = report.found.info.get("solves")
+    counted = "" if solves is None else f"{solves} forward solves, "
+    console.print(f"{counted}{report.seconds:.2f} s")
+    for note in report.found.notes:
+        console.print(escape(note))
+
+
+def _cell(value: Any) -> str:
+    if getattr(value, "ndim", 0):
+        return f"{value[0]:.4f} .. {value[1]:.4f}"
+    return f"{value:.4f}"

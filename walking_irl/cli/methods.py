@@ -1,0 +1,43 @@
+"""``walking-irl methods``: all inverse methods, where they run and what they guarantee."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from walking_irl.baselines.registry import METHODS
+from walking_irl.cli import DONE
+
+
+def add_parser(commands: Any) -> argparse.ArgumentParser:
+    """The command's parser."""
+    p: argparse.ArgumentParser = commands.add_parser(
+        "methods", help="list the methods that recover --method knows (table 3.1)"
+    )
+    return p
+
+
+def run(args: argparse.Namespace, console: Console) -> int:
+    """``walking-irl methods``."""
+    table = Table()
+    table.add_column("method", no_wrap=True)
+    for name in ("needs", "answers with", "forward solves", "guarantee", "worlds"):
+        table.add_column(name, overflow="fold")
+    for m in METHODS.values():
+        reward = "linear" if m.is_linear else "any"
+        needs = m.needs.value + (", model" if m.needs_model else "")
+        worlds = ", ".join(m.worlds)
+        table.add_row(
+            m.name,
+            needs,
+            f"{m.answer} ({reward} reward)",
+            m.solves,
+            m.guarantee,
+            worlds,
+        )
+    console.print(table)
+    console.print("measured losses: walking-irl tables 3.1; to run one: recover --method NAME")
+    return DONE

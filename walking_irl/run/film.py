@@ -1,0 +1,51 @@
+"""A run's recording: its iterations and, where the domain has a view, their policies."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from walking_irl.recording import Experiment, Recorder
+from walking_irl.recording.views.registry import World, world_of
+from walking_irl.run.problem import Problem
+from walking_irl.types import Iteration
+
+
+class Film(NamedTuple):
+    """A recorder, and what it shows of policies; a domain without a view has no picture."""
+
+    recorder: Recorder[Any]
+    world: World | None
+
+    def show(self, it: Iteration) -> None:
+        """Show an iteration and its policy."""
+        self.recorder.iteration(it, self._motion(it))
+
+    def finale(self, it: Iteration) -> None:
+        """Show the policy of the recovered weights, for longer."""
+        if self.world is not None:
+            self.recorder.finale(self._motion(it))
+
+    def _motion(self, it: Iteration) -> Any:
+        return None if self.world is None else self.world.motion(it.response.policy, it.w)
+
+
+@contextmanager
+def film(problem: Problem, path: Path) -> Iterator[Film]:
+    """Record a run; the file appears when the block ends, also after an error."""
+    setup, shown = problem.setup, problem.demonstration
+    world = world_of(problem.domain, shown)
+    experiment = Experiment(
+        domain=setup.domain,
+        objectives=problem.objectives,
+        expert=shown.expert,
+        centre=setup.centre,
+        mode=setup.mode,
+        seed=setup.drawn_from,
+        truth=shown.truth,
+        question=problem.domain.question,
+    )
+    with Recorder(path, experiment, None if world is None else world.view) as recorder:
+        yield Film(recorder, world)
