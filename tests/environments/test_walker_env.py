@@ -260,7 +260,7 @@ def test_every_task_of_the_suite_can_be_loaded_and_stepped(body):
         env.reset()
         step = env.step(np.zeros(env.action_spec().shape))
         assert step.reward == 0.0 and step.discount == 1.0
-    with pytest.raises(InvalidInputError, match="unknown body 'horse'; choose from humanoid, "):
+    with pytest.raises(InvalidInputError, match="there is no body 'horse'; choose from humanoid, "):
         environments.load("horse")
 
 
