@@ -171,6 +171,6 @@ def test_cells_of_other_code_are_run_again(tmp_path, monkeypatch):
     [before] = Runner(cache=tmp_path).outcomes("x", [OPTIMAL])
     monkeypatch.setattr(runner, "code_digest", lambda: "another")
     calls = []
-    monkeypatch.setattr(runner, "run_task", lambda task: calls.append(task) or before)
+    monkeypatch.setattr(runner, "run_job", lambda task: calls.append(task) or before)
     Runner(cache=tmp_path).outcomes("x", [OPTIMAL])
     assert calls == [OPTIMAL]

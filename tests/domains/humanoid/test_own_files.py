@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from walking_irl.domains.humanoid.closed_loop.trials import Trials
+from walking_irl.domains.contract import Request
 from walking_irl.domains.humanoid.demonstrations import demonstrated
 from walking_irl.domains.humanoid.domain import Humanoid
 from walking_irl.domains.humanoid.gait.cycles import drifting_spline
@@ -83,8 +83,12 @@ def test_rounding_and_other_sampling_are_taken_out(tmp_path, n, start, rounding)
 def recorded():
     """Three recorded rollouts of the reference gait, and what their domain makes of them."""
     domain = Humanoid("humanoid-planar")
-    made = domain.demonstrate(KNOWN.w, np.random.default_rng(0), Trials(3, cycles=2))
-    columns = {k: np.array([getattr(r, k) for r in made.rollouts]) for k in ("time", "q", "v", "u")}
+    made = domain.demonstrate(
+        Request(KNOWN.w, options={"rollouts": 3}), rng=np.random.default_rng(0)
+    )
+    columns = {
+        k: np.array([getattr(r, k) for r in made.trajectories]) for k in ("time", "q", "v", "u")
+    }
     return made, {"joints": np.array(WALKER.joints), **columns}
 
 
@@ -96,7 +100,7 @@ def test_recorded_rollouts_are_an_expert_with_error_bars(tmp_path, recorded):
     np.testing.assert_allclose(shown.expert.mu, made.expert.mu, rtol=1e-6)
     np.testing.assert_allclose(shown.expert.error, made.expert.error, rtol=1e-3)
     np.testing.assert_allclose(shown.gait.q, made.expert.demonstration.q, atol=1e-9)
-    np.testing.assert_allclose(shown.rollouts[0].a[:-1], made.rollouts[0].a[:-1], atol=1e-4)
+    np.testing.assert_allclose(shown.rollouts[0].a[:-1], made.trajectories[0].a[:-1], atol=1e-4)
 
 
 @pytest.mark.parametrize(
