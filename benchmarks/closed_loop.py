@@ -20,7 +20,7 @@ from bench import table, verdict
 
 from walking_irl.domains.humanoid.body.anatomy import Walker
 from walking_irl.domains.humanoid.body.load import load_walker
-from walking_irl.domains.humanoid.closed_loop.environment import Push
+from walking_irl.domains.humanoid.closed_loop.disturbance import Push
 from walking_irl.domains.humanoid.closed_loop.policy import TrackingPolicy, tracking_policy
 from walking_irl.domains.humanoid.closed_loop.rollout import rollout
 from walking_irl.domains.humanoid.domain import Humanoid

@@ -13,11 +13,8 @@ import numpy as np
 from walking_irl.arrays import Array
 from walking_irl.domains.humanoid.body.anatomy import Walker
 from walking_irl.domains.humanoid.body.load import SHIPPED, load_walker
-from walking_irl.domains.humanoid.closed_loop.environment import (
-    Disturbance,
-    environment,
-    start_of,
-)
+from walking_irl.domains.humanoid.closed_loop.disturbance import Disturbance
+from walking_irl.domains.humanoid.closed_loop.environment import environment, start_of
 from walking_irl.domains.humanoid.closed_loop.progress import best_known
 from walking_irl.domains.humanoid.gait.gait import Gait
 from walking_irl.domains.humanoid.gait.library import load_library

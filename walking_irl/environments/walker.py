@@ -16,11 +16,8 @@ from gymnasium.spaces import Box
 from gymnasium.utils import EzPickle
 
 from walking_irl.arrays import Array
-from walking_irl.domains.humanoid.closed_loop.environment import (
-    Disturbance,
-    environment,
-    start_of,
-)
+from walking_irl.domains.humanoid.closed_loop.disturbance import Disturbance
+from walking_irl.domains.humanoid.closed_loop.environment import environment, start_of
 from walking_irl.domains.humanoid.closed_loop.progress import FALL_METRES
 from walking_irl.domains.humanoid.gait.pictures import Image
 from walking_irl.environments.camera import Camera, Window

@@ -4,12 +4,8 @@ import numpy as np
 import pytest
 
 from walking_irl.domains.humanoid.body.load import load_walker
-from walking_irl.domains.humanoid.closed_loop.environment import (
-    Disturbance,
-    Push,
-    environment,
-    start_of,
-)
+from walking_irl.domains.humanoid.closed_loop.disturbance import Disturbance, Push
+from walking_irl.domains.humanoid.closed_loop.environment import environment, start_of
 from walking_irl.domains.humanoid.closed_loop.policy import tracking_policy
 from walking_irl.domains.humanoid.closed_loop.rollout import rollout
 from walking_irl.domains.humanoid.costs.defaults import REFERENCE_WEIGHTS

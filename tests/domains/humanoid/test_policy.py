@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from walking_irl.domains.humanoid.body.load import load_walker
-from walking_irl.domains.humanoid.closed_loop.environment import Push
+from walking_irl.domains.humanoid.closed_loop.disturbance import Push
 from walking_irl.domains.humanoid.closed_loop.policy import TrackingPolicy, tracking_policy
 from walking_irl.domains.humanoid.closed_loop.rollout import averaged_gait, rollout
 from walking_irl.domains.humanoid.costs.stack import cost_stack

@@ -8,7 +8,6 @@ is, so the reward of a step belongs to the step before it.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import mujoco
@@ -19,6 +18,11 @@ from dm_env import specs
 from walking_irl.arrays import Array, Indices
 from walking_irl.domains.humanoid.body.anatomy import Walker
 from walking_irl.domains.humanoid.body.physics import WalkerPhysics
+from walking_irl.domains.humanoid.closed_loop.disturbance import (
+    PUSH_DURATION,
+    Disturbance,
+    Push,
+)
 from walking_irl.domains.humanoid.closed_loop.progress import FALL_METRES, price_of_progress
 from walking_irl.domains.humanoid.costs.base import REFERENCE_SPEED, Channels
 from walking_irl.domains.humanoid.costs.defaults import DEFAULT_COSTS, Costs
@@ -29,7 +33,6 @@ from walking_irl.errors import InvalidInputError
 
 FALL_DROP = 0.3  # of the pelvis below upright standing [m]
 FALL_PITCH = 1.0  # of the pelvis [rad]
-PUSH_DURATION = 0.1  # [s]
 
 
 class Start(NamedTuple):
@@ -46,13 +49,6 @@ class Start(NamedTuple):
     speed: float
 
 
-class Push(NamedTuple):
-    """A force on the pelvis from ``time`` [s] on, for PUSH_DURATION; (x, y, z) [N]."""
-
-    time: float
-    force: tuple[float, float, float]
-
-
 class Step(NamedTuple):
     """One step of a walk: state and sensors at its start, torque and acceleration during it."""
 
@@ -61,21 +57,6 @@ class Step(NamedTuple):
     a: Array
     u: Array
     sensors: Array
-
-
-@dataclass(frozen=True)
-class Disturbance:
-    """What keeps a walk from repeating itself.
-
-    Attributes:
-        velocity_noise: Standard deviation of the joints' velocities at the start [rad/s].
-        kicks: The same of changes of velocity at one random step of every gait cycle [rad/s].
-        push: A push against the pelvis.
-    """
-
-    velocity_noise: float = 0.0
-    kicks: float = 0.0
-    push: Push | None = None
 
 
 class WalkTask(control.Task):  # type: ignore[misc]

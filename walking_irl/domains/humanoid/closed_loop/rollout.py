@@ -8,13 +8,8 @@ import numpy as np
 from dm_control.rl.control import Environment, PhysicsError
 
 from walking_irl.domains.humanoid.body.anatomy import Walker
-from walking_irl.domains.humanoid.closed_loop.environment import (
-    Disturbance,
-    Push,
-    Start,
-    Step,
-    environment,
-)
+from walking_irl.domains.humanoid.closed_loop.disturbance import Disturbance, Push
+from walking_irl.domains.humanoid.closed_loop.environment import Start, Step, environment
 from walking_irl.domains.humanoid.closed_loop.policy import TrackingPolicy
 from walking_irl.domains.humanoid.gait.cycles import mirror_average
 from walking_irl.domains.humanoid.gait.gait import Gait
