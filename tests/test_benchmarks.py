@@ -20,7 +20,7 @@ ROWS = {
     ],
     "evaluated_policies": ["lqr, queries alone", "lqr, demonstration", "gridworld, iterates"],
     "forward_solver": ["gait solver, one iteration", "mujoco.minimize.least_squares"],
-    "recovery": ["MuJoCo's inverse dynamics and derivatives", "linear algebra", "queries"],
+    "recovery": ["MuJoCo's inverse dynamics", "linear algebra", "Hessians", "queries"],
 }
 HEADLINES = {
     "centres": r"^ac: .* \(target >= 5\): .*\n^cc: .*\n^mvie: ",

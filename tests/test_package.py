@@ -92,7 +92,7 @@ def test_wheel_in_a_fresh_environment_finds_its_models(tmp_path):
         "print(len(load_gaits('humanoid-planar')))\n"
     )
     done = subprocess.run(
-        [python, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
+        [python, "-I", "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
     )
     *paths, n_gaits = done.stdout.split()
     assert int(n_gaits) >= 7

@@ -166,3 +166,12 @@ def test_a_demonstration_that_nobody_could_walk_is_made_physical_first(near):
     answer = learner(NEAR)
     assert -answer.mu @ NEAR == pytest.approx(cost, rel=1e-7)
     np.testing.assert_allclose(answer.policy.to_vector(), found.x, atol=1e-4)
+
+
+@pytest.mark.parametrize("unknown", [-2, -1], ids=["step length", "half period"])
+def test_a_gait_that_does_not_go_forward_is_no_start_and_no_step(unknown):
+    """Its costs per metre are negative: it would be cheaper than every walk."""
+    x = reference(PLANAR)
+    x[unknown] *= -1
+    with pytest.raises(SolverError):
+        solver_for(PLANAR).solve(W, x)

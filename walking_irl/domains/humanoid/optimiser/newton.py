@@ -173,8 +173,10 @@ class Newton:
         self.last: Model | None = None
 
     def state(self, x: Array) -> State:
-        """The gait ``x`` with its cost."""
+        """The gait ``x`` with its cost: infinite where it does not go forward in time and space."""
         ev = self.problem.evaluate(x)
+        if not (x[-2] > 0 and x[-1] > 0):  # costs per metre would be negative, and win
+            return State(ev, np.inf)
         away = x - self.anchor
         total = ev.total(self.w, self.stage.penalty) + float(away @ (self.tether * away))
         return State(ev, total / 2)
