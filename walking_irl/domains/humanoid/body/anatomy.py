@@ -86,6 +86,11 @@ class Walker:
             [rows.stop - rows.start for rows in self.sensor.values()],
         )
 
+    @cached_property
+    def tendon_stiffness(self) -> Array:
+        """Cubic part k3 of each driven joint's stiffness [Nm/rad^3], shape (nu,)."""
+        return _constant(np.array(self.model.jnt_stiffnesspoly[self.n_root :, 1]))
+
     @property
     def torque_mirror(self) -> Array:
         """Swaps the sides of joint torques, shape (nu, nu)."""

@@ -116,10 +116,15 @@ class CostStack:
     @cached_property
     def reference_weights(self) -> Array:
         """Weights of the most human gait known, as far as the costs know them; shape (K,)."""
-        default = REFERENCE_SHARE * UNIT
-        known = [default / c.scale if c.reference is None else c.reference for c in self.per_metre]
-        w = np.array(known) * self._scales
+        raw = [self._reference(c) for c in self.per_metre]
+        w = np.array(raw) * self._scales
         return np.asarray(w / w.sum())
+
+    def _reference(self, cost: Cost) -> float:
+        """Coefficient of the raw cost in the most human gait known."""
+        is_planar = not self.walker.is_lateral and cost.planar_reference is not None
+        known = cost.planar_reference if is_planar else cost.reference
+        return REFERENCE_SHARE * UNIT / cost.scale if known is None else known
 
     def residuals(self, c: Channels) -> Array:
         """Residuals of all terms, shape (N, M)."""
