@@ -1,4 +1,4 @@
-"""Experiments: the thesis's tables 7.1 to 7.10 and figure 7.1, and three tables of the humanoid."""
+"""Experiments: the thesis's tables 2.1, 3.1, 7.1 to 7.10 and figure 7.1, and the humanoid's."""
 
 from __future__ import annotations
 
