@@ -16,9 +16,11 @@ from walking_irl.workers import workers
 def add_parser(commands: Any) -> argparse.ArgumentParser:
     """The command's parser."""
     p: argparse.ArgumentParser = commands.add_parser(
-        "tables", help="regenerate the thesis's tables and two more"
+        "tables", help="regenerate the thesis's tables and more"
     )
-    p.add_argument("names", nargs="+", metavar="TABLE", help="7.1 ... 7.12, fig7.1, or all")
+    p.add_argument(
+        "names", nargs="+", metavar="TABLE", help="2.1, 3.1, 7.1 ... 7.13, fig7.1, or all"
+    )
     p.add_argument("--seeds", type=int, help="experts per cell")
     p.add_argument("--out", type=Path, default=Path("tables"), help="folder (%(default)s)")
     p.add_argument("--quiet", action="store_true", help="print the files' names only")
