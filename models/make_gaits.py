@@ -1,12 +1,12 @@
 """Makes ``gaits.npz`` from nothing: run ``python models/make_gaits.py`` (minutes, two cores).
 
-A first guess is drawn from textbook joint angles (D. A. Winter, Biomechanics and Motor Control of
-Human Movement, 4th ed. 2009: key points of hip, knee and ankle at natural cadence), which neither
-stands on the ground nor obeys physics. It is tied to these angles while a homotopy in the root
-penalty makes it walk under the reference weights, and then released: many basins of this problem
-are worse than the one that people walk in, and this is how to get there. Every gait then hops
-between basins: it is perturbed, solved again, and the cheapest gait is kept; at last the gaits
-exchange basins. Nothing but this file decides what is shipped.
+A first guess is drawn from the mean joint angles of healthy adults (``models/norms``), which on
+this body neither stand on the ground nor obey physics. It is tied to these angles at hip, knee and
+ankle while a homotopy in the root penalty makes it walk under the reference weights, and then
+released: many basins of this problem are worse than the one that people walk in, and this is how
+to get there. Every gait then hops between basins: it is perturbed, solved again, and the cheapest
+gait is kept; at last the gaits exchange basins. The norms decide where the search begins and
+nothing else; what is shipped is optimal for its weights alone.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from walking_irl.arrays import Array
 from walking_irl.domains.humanoid.body.anatomy import Walker, lowest_points
 from walking_irl.domains.humanoid.gait.gait import Gait
 from walking_irl.domains.humanoid.gait.library import PREFIX, load_gaits, own_gaits
+from walking_irl.domains.humanoid.gait.norm_curves import norm_set
 from walking_irl.domains.humanoid.learner import polish, solver_for
 from walking_irl.domains.humanoid.optimiser.solver import Solution
 from walking_irl.domains.humanoid.optimiser.stages import Stage, stage
@@ -32,17 +32,24 @@ from walking_irl.domains.humanoid.spec import HUMANOID, PLANAR, WalkerSpec
 from walking_irl.errors import SolverError
 
 N_KNOTS = 40
-SPEED, HALF_PERIOD = 1.25, 0.55  # of the guess [m/s], [s]
-KEY_POINTS = {  # phase of the gait cycle from the right heel strike, angle [deg]
-    "hip_flexion": ([0, 0.15, 0.3, 0.5, 0.65, 0.85], [28, 22, 5, -12, 8, 30]),
-    "knee": ([0, 0.13, 0.4, 0.55, 0.72, 0.9], [6, 18, 6, 22, 60, 20]),
-    "ankle": ([0, 0.07, 0.2, 0.45, 0.63, 0.8], [0, -5, 3, 10, -15, 0]),
-    "shoulder": ([0, 0.25, 0.5, 0.75], [-18, 0, 18, 0]),
-    "elbow": ([0, 0.5], [20, 20]),
+STEP_LENGTH, HALF_PERIOD = 0.68, 0.54  # of the guess [m], [s]
+SINK = 0.007  # of the soles into the ground, at first [m]
+HARMONICS = 13  # of a cycle's curves that the guess keeps
+ANGLES = {  # joint, curve of the norm, sign
+    "hip_flexion": ("hip_flexion", 1),
+    "knee": ("knee_flexion", 1),
+    "ankle": ("ankle_dorsiflexion", 1),
+    "root_yaw": ("pelvis_rotation", 1),
+    "root_roll": ("pelvis_obliquity", -1),
 }
-TIED = tuple(stage(p, 60, 1e-4, tether=t) for p, t in ((1e1, 10), (1e2, 3), (1e3, 1)))
-RELEASED = tuple(stage(p, 60, 1e-4, tether=t) for p, t in ((1e3, 0.1), (1e3, 0.01), (1e3, 0.0)))
-SOFTLY = (stage(1e3, 60, 1e-5), stage(1e4, 60, 1e-6))
+ARM_SWING, ELBOW = 15, 20  # [deg]
+TIES = {"hip_flexion": 1.0, "knee": 1.0, "ankle": 1.0, "other": 0.01, "step": 0.3}
+"""How tightly joints are tied to the guess, and step length and period."""
+TIED = tuple(
+    stage(p, 60, 1e-5, tether=t)
+    for p, t in ((1e1, 30), (1e2, 30), (1e3, 10), (1e4, 10), (1e4, 3), (1e4, 1), (1e4, 0.3))
+)
+RELEASED = (stage(1e4, 60, 1e-5),)
 SEARCH = (stage(1e4, 60, 1e-6),)
 FINISH = (stage(1e5, 60, 1e-6), stage(1e6, 100, 1e-11))
 HOPS = {"reference": 16, "other": 4}
@@ -53,21 +60,46 @@ HAIRS = np.deg2rad([0.005, 0.02, 0.1, 0.3])
 
 
 def guess(walker: Walker) -> Array:
-    """Textbook joint angles on the ground: a gait vector."""
+    """Joint angles of healthy adults, with the soles on the ground: a gait vector."""
     phase = np.arange(N_KNOTS) / (2 * N_KNOTS)
+    norm = {
+        name: c.mean for name, c in norm_set("adults", STEP_LENGTH / HALF_PERIOD, 1).curves.items()
+    }
+    norm["hip_flexion"] = norm["hip_flexion"] - norm["pelvis_tilt"].mean()
+    turn = 2 * np.pi * np.arange(101) / 100
+    curves = {joint: sign * norm[name] for joint, (name, sign) in ANGLES.items()}
+    curves["shoulder"] = -ARM_SWING * np.cos(turn)
+    curves["elbow"] = np.full(101, ELBOW)
     q = np.zeros((N_KNOTS, len(walker.joints)))
-    for joint, (at, angle) in KEY_POINTS.items():
-        closed = CubicSpline([*at, 1 + at[0]], [*angle, angle[0]], bc_type="periodic")
-        for side, offset in (("r", 0.0), ("l", 0.5)):
-            column = walker.joints.index(f"{joint}_{side}")
-            q[:, column] = np.deg2rad(closed((phase + offset) % 1))
-    q[:, 0] = np.arange(N_KNOTS) / N_KNOTS * SPEED * HALF_PERIOD
+    for column, joint in enumerate(walker.joints):
+        curve = curves.get(joint.removesuffix("_r").removesuffix("_l"))
+        if curve is not None:
+            q[:, column] = np.deg2rad(_cycle(curve, phase + 0.5 * joint.endswith("_l")))
+    q[:, 0] = np.arange(N_KNOTS) / N_KNOTS * STEP_LENGTH
     z = walker.joints.index("root_z")
-    q[:, z] = -lowest_points(walker, q)
-    harmonics = np.fft.rfft(q[:, z])
-    harmonics[3:] = 0
-    q[:, z] = np.fft.irfft(harmonics, N_KNOTS)
-    return Gait(q, SPEED * HALF_PERIOD, HALF_PERIOD).to_vector()
+    q[:, z] = _smooth(-lowest_points(walker, q), 3) - SINK
+    return Gait(q, STEP_LENGTH, HALF_PERIOD).to_vector()
+
+
+def _smooth(curve: Array, harmonics: int) -> Array:
+    """The first harmonics of a closed curve, the mean counted."""
+    amplitudes = np.fft.rfft(curve)
+    amplitudes[harmonics:] = 0
+    return np.asarray(np.fft.irfft(amplitudes, len(curve)))
+
+
+def _cycle(curve: Array, phase: Array) -> Array:
+    """A curve over 0 ... 100 % of the cycle, closed, at phases in cycles."""
+    closed = curve - (curve[-1] - curve[0]) * np.linspace(-0.5, 0.5, 101)
+    smooth = _smooth(closed[:-1], HARMONICS)
+    return np.asarray(np.interp(phase % 1 * 100, np.arange(101), np.r_[smooth, smooth[0]]))
+
+
+def ties(walker: Walker) -> Array:
+    """How tightly each unknown is tied to the guess, shape (N nv + 2,)."""
+    stems = (j.removesuffix("_r").removesuffix("_l") for j in walker.joints)
+    joints = [TIES.get(stem, TIES["other"]) for stem in stems]
+    return np.concatenate([np.tile(joints, N_KNOTS), [TIES["step"]] * 2])
 
 
 class Maker:
@@ -104,9 +136,8 @@ class Maker:
     def walk(self, x: Array) -> Array:
         """A walk under the reference weights, from joint angles that are no walk."""
         w = self.spec.stack.reference_weights
-        for s in (*TIED, *RELEASED, *SOFTLY):  # each tied to the result of the one before
-            x = polish(self.spec, w, x, (s,)).x
-        return x
+        tied = self.solver.solve(w, x, TIED, ties=ties(self.spec.walker))
+        return self.solver.solve(w, tied.x, RELEASED).x
 
     def hop(self, w: Array, x: Array, hops: int, seed: int) -> Array:
         """Perturb, solve again, keep the cheapest; in rounds of two, then finish."""
@@ -134,7 +165,7 @@ class Maker:
         """The best gait for ``w`` near any of the four known ones that are cheapest under it."""
         penalty = FINISH[-1].penalty
         near = sorted(gaits, key=lambda y: self.cost(w, y, penalty))[:4]
-        found = self.run(w, near, (*SOFTLY, *FINISH)) + self.run(w, near[:2], FINISH)
+        found = self.run(w, near, SEARCH + FINISH) + self.run(w, near[:2], FINISH)
         return min([near[0], *found], key=lambda y: self.cost(w, y, penalty))
 
     def make(self, start: Array) -> dict[str, Array]:
@@ -167,13 +198,6 @@ class Maker:
         )
 
 
-def in_the_plane(x: Array) -> Array:
-    """The joints that the planar body has, of a gait of the spatial one."""
-    spatial, planar = HUMANOID.walker.joints, PLANAR.walker.joints
-    gait = Gait.from_vector(x, len(spatial))
-    return Gait(gait.q[:, [spatial.index(j) for j in planar]], *x[-2:]).to_vector()
-
-
 def weights_to_ship(spec: WalkerSpec) -> dict[str, Array]:
     """Names and weights of all gaits, the reference first."""
     reference = spec.stack.reference_weights
@@ -197,12 +221,11 @@ def main() -> None:
     args = parser.parse_args()
     with ProcessPoolExecutor(args.workers, mp_context=get_context("spawn")) as pool:
         if args.body is None:
-            maker = Maker(HUMANOID, pool)
-            spatial = maker.make(maker.walk(guess(HUMANOID.walker)))
-            flat = in_the_plane(spatial[PREFIX[HUMANOID.body] + "x"][0])
-            maker = Maker(PLANAR, pool)
-            planar = maker.make(maker.walk(flat))
-            np.savez_compressed(args.out, **spatial, **planar)
+            found = {}
+            for spec in (HUMANOID, PLANAR):
+                maker = Maker(spec, pool)
+                found |= maker.make(maker.walk(guess(spec.walker)))
+            np.savez_compressed(args.out, **found)
         else:
             spec = WalkerSpec(str(args.body))
             start = next(iter(load_gaits(spec.body).values())).to_vector()

@@ -164,11 +164,14 @@ class Newton:
         *,
         known: float | None = None,
         root: Array | None = None,
+        ties: Array | None = None,
     ) -> None:
         self.structure, self.problem = structure, structure.problem
         self.w, self.stage, self.anchor, self.known, self.root = w, stage, anchor, known, root
-        self.tether = np.full(anchor.size, stage.tether)
-        self.tether[-2:] *= anchor.size  # L and T concern all knots
+        if ties is None:
+            ties = np.ones(anchor.size)
+            ties[-2:] = anchor.size  # L and T concern all knots
+        self.tether = stage.tether * ties
         self.damping = START_DAMPING
         self.last: Model | None = None
 
