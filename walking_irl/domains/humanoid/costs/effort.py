@@ -36,6 +36,7 @@ class Effort(Cost):
     meaning: str = "Squared torque of muscle and tendon relative to the strength of its direction."
     formula: str = "|(tau - k3 (q - ref)^3) / strength|^2"
     reference: float | None = 1.282
+    planar_reference: float | None = 1.418
     switch: float = 10.0
 
     def terms(self, walker: Walker) -> Sequence[Term]:

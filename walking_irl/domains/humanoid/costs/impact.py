@@ -26,6 +26,7 @@ class Impact(Cost):
     meaning: str = "Squared rate of the ground reaction force under each foot."
     formula: str = "|dF/dt|^2"
     reference: float | None = 0.416
+    planar_reference: float | None = 0.505
     rate: float = 10.0
 
     def terms(self, walker: Walker) -> Sequence[Term]:

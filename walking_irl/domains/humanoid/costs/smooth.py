@@ -29,6 +29,7 @@ class Smoothness(Cost):
     meaning: str = "Squared joint accelerations, and squared rates of the joint torques."
     formula: str = ".5 |a / (50 rad/s^2)|^2 + |dtau/dt / (5 strengths/s)|^2"
     reference: float | None = 0.1219
+    planar_reference: float | None = 0.0907
     acceleration: float = 50.0
     rate: float = 5.0
 

@@ -19,6 +19,7 @@ class Time(Cost):
     meaning: str = "Time that a metre takes."
     formula: str = "1"
     reference: float | None = 0.5535
+    planar_reference: float | None = 0.862
 
     def terms(self, walker: Walker) -> Sequence[Term]:
         """One in every step."""

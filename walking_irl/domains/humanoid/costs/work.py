@@ -39,6 +39,7 @@ class Work(Cost):
     meaning: str = "Mechanical power, negative power a fifth as dear as positive."
     formula: str = "(1.66 max(0, tau v) + .34 max(0, -tau v)) / 100 W"
     reference: float | None = 0.3485
+    planar_reference: float | None = 0.3105
     power: float = 100.0
     smoothing: float = 20.0
     efficiencies: tuple[float, float] = (0.25, 1.2)
