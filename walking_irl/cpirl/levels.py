@@ -67,7 +67,7 @@ class Optimal:
 
     def probed(self, bundle: Bundle, level: float) -> Array:
         """See :class:`Levels`."""
-        both: Array = np.maximum(self.explaining(bundle), level * np.abs(bundle.mu))
+        both: Array = np.maximum(self.explaining(bundle), level * bundle.units)
         return both
 
     def polyhedron(self, bundle: Bundle) -> WeightPolyhedron:
@@ -88,7 +88,7 @@ class Tolerance(Optimal):
 
     def explaining(self, bundle: Bundle) -> Array:
         """See :class:`Levels`."""
-        level: Array = self.tol * np.abs(bundle.mu)
+        level: Array = self.tol * bundle.units
         return level
 
 
@@ -106,7 +106,7 @@ class LeastRegret:
 
     def probed(self, bundle: Bundle, level: float) -> Array:
         """See :class:`Levels`."""
-        both: Array = self.explaining(bundle) + level * np.abs(bundle.mu)
+        both: Array = self.explaining(bundle) + level * bundle.units
         return both
 
     def polyhedron(self, bundle: Bundle) -> WeightPolyhedron:
