@@ -16,7 +16,7 @@ from walking_irl.run.by_method import HORIZON, TRAJECTORIES, MethodReport, recov
 from walking_irl.run.setup import Setup
 from walking_irl.workers import workers
 
-CPIRL_ONLY = ("centre", "mode", "max_solves")
+CPIRL_ONLY = ("centre", "mode", "max_solves", "expert_gap", "min_weight")
 """Settings of a recovery that are CPIRL's own."""
 
 

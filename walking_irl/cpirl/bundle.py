@@ -238,7 +238,8 @@ class Bundle:
         are those for which the expert is at least as close to optimal as for the estimate.
         """
         f = max(float(self.values(estimate) - estimate @ (self.mu + self.error)), 0.0)
-        for least in (0.0, f, f + 1e-6 * self.unit):
+        f -= self.expert.suboptimality  # which the cuts grant
+        for least in (-np.inf, f, f + 1e-6 * self.unit):
             try:
                 return self.polyhedron(np.maximum(level, least)).intervals()
             except (EmptyPolyhedronError, SolverError):

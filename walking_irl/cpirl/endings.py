@@ -14,6 +14,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from walking_irl.arrays import Array
+from walking_irl.cpirl.certainty import bracket_of
 from walking_irl.cpirl.gauge import gauge_fixed
 from walking_irl.cpirl.levels import Levels
 from walking_irl.cpirl.newton_phase import MOST_POOR
@@ -29,6 +30,9 @@ _EXACT_STEP, _ESTIMATED_STEP = 2e-4, 1e-3
 """Newton step (L1) that counts as none."""
 _BEATEN = -1e-8
 """Certificate, relative to the expert's features, that proves that a mixture beats it."""
+_CLOSED = 3.0
+"""Ratio of the ends of min f's bracket, the lower above 0, below which there is little to learn:
+half widths, which follow its root, would become narrower by sqrt(3) at most."""
 
 
 class Endings(NamedTuple):
@@ -125,7 +129,10 @@ def gains_nothing(outlook: Outlook) -> Ending | None:
     """Poor steps where the regret is as low as the demonstration's own gap may be."""
     progress = outlook.progress
     assert progress is not None
-    is_over = progress.n_poor >= MOST_POOR and progress.gap <= _FLOOR
+    is_low = progress.gap <= _FLOOR
+    if not is_low and progress.n_poor >= MOST_POOR:
+        is_low = bracket_of(outlook.bundle, progress.target).is_closed(_CLOSED)
+    is_over = progress.n_poor >= MOST_POOR and is_low
     return Ending(Status.CONVERGED) if is_over else None
 
 
@@ -198,8 +205,40 @@ def is_flat(outlook: Outlook) -> Ending | None:
 
 def is_empty(outlook: Outlook) -> Ending | None:
     """No weights are left: a mixture beats the expert, or its features are off."""
-    is_beaten = outlook.bundle.game.value < _BEATEN * outlook.bundle.unit
-    return Ending(Status.MIXTURE_DOMINATES if is_beaten else Status.EMPTY)
+    if outlook.bundle.game.value >= _BEATEN * outlook.bundle.unit:
+        return Ending(Status.EMPTY)
+    is_asked = not outlook.levels.has_known_minimum
+    return Ending(Status.MIXTURE_DOMINATES if is_asked else Status.CONTRADICTED)
+
+
+# What an ending means, by the bracket of min f.
+
+_UNFINISHED = (Status.BUDGET, Status.STALLED, Status.EMPTY)
+
+
+def told_true(decision: Decision, outlook: Outlook, tol: float) -> Decision:
+    """The ending in the light of what is known of min f; a run that goes on is not asked.
+
+    Where the bracket has closed nothing is left to ask, whatever ended the run. Modes that take
+    min f to be 0 are contradicted by an exact expert whose lower bound is above what it is granted;
+    one above the tolerance says that the expert is not exactly optimal.
+
+    Args:
+        decision: What is believed.
+        outlook: What is known.
+        tol: Regret that counts as none, relative.
+    """
+    bundle, status, takes_zero = outlook.bundle, decision.status, outlook.levels.has_known_minimum
+    if decision.query is not None or not (status.has_weights or status in _UNFINISHED):
+        return decision
+    none = tol * float(bundle.scale(decision.estimate))
+    bracket = bracket_of(bundle, decision.estimate)
+    if takes_zero and bundle.is_exact and bracket.lower > max(bundle.expert.suboptimality, none):
+        return decision._replace(status=Status.CONTRADICTED)
+    is_done = takes_zero if status.has_weights else bracket.is_closed(_CLOSED)
+    if is_done and bracket.lower > none:
+        return decision._replace(status=Status.NOT_OPTIMAL)
+    return decision
 
 
 # On the iterations so far.

@@ -40,7 +40,10 @@ class Levels(Protocol):
         ...
 
     def probed(self, bundle: Bundle, level: float) -> Array:
-        """Level of probed intervals: ``level``, relative, and never below the cuts'; (K,)."""
+        """Level that cuts the intervals {f <= level} out, shape (K,).
+
+        Cuts grant the expert its sub-optimality; here ``level``, in units of w.mu, says it all.
+        """
         ...
 
     def polyhedron(self, bundle: Bundle) -> WeightPolyhedron:
@@ -67,8 +70,10 @@ class Optimal:
 
     def probed(self, bundle: Bundle, level: float) -> Array:
         """See :class:`Levels`."""
-        both: Array = np.maximum(self.explaining(bundle), level * bundle.units)
-        return both
+        own = np.full(bundle.K, level - bundle.expert.suboptimality)
+        if bundle.is_exact and not self.is_set:
+            return own
+        return np.asarray(np.maximum(self.explaining(bundle), own))
 
     def polyhedron(self, bundle: Bundle) -> WeightPolyhedron:
         """See :class:`Levels`."""
@@ -106,8 +111,10 @@ class LeastRegret:
 
     def probed(self, bundle: Bundle, level: float) -> Array:
         """See :class:`Levels`."""
-        both: Array = self.explaining(bundle) + level * bundle.units
-        return both
+        own = level - bundle.expert.suboptimality
+        if bundle.is_exact:
+            return np.full(bundle.K, own)
+        return self.explaining(bundle) + max(own, 0.0)
 
     def polyhedron(self, bundle: Bundle) -> WeightPolyhedron:
         """Weights that may still lower the regret, be it below 0, as noisy features allow.
