@@ -76,7 +76,11 @@ def cluster(address: str) -> Iterator[Executor]:
             "--scheduler needs the package distributed: pip install 'walking-irl[cluster]'"
         ) from error
     connect: Any = Client  # untyped
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # we say it in one sentence
+    with _unsaid():
+        yield from _connected(connect, address, KilledWorker)
+
+
+def _connected(connect: Any, address: str, killed: type[Exception]) -> Iterator[Executor]:
     try:
         client: Any = connect(address, timeout=CONNECT, set_as_default=False)
     except (OSError, ValueError) as error:
@@ -88,7 +92,7 @@ def cluster(address: str) -> Iterator[Executor]:
     try:
         _await_worker(client, address)
         yield pool
-    except KilledWorker as error:
+    except killed as error:
         raise ClusterError(f"a job killed every worker that took it: {error}") from error
     except CancelledError as error:
         raise ClusterError(
@@ -98,6 +102,20 @@ def cluster(address: str) -> Iterator[Executor]:
     finally:
         pool.shutdown(wait=False)
         client.close(timeout=CONNECT)
+
+
+@contextmanager
+def _unsaid() -> Iterator[None]:
+    """What ``distributed`` logs is told in one sentence instead."""
+    names = [n for n in logging.root.manager.loggerDict if n.split(".")[0] == "distributed"]
+    levels = {name: logging.getLogger(name).level for name in names}
+    for name in names:
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        for name, level in levels.items():
+            logging.getLogger(name).setLevel(level)
 
 
 def _await_worker(client: Any, address: str) -> None:
