@@ -10,16 +10,19 @@ from rich.console import Console
 from rich.markup import escape
 
 from walking_irl.cli import DONE, INTERRUPTED
-from walking_irl.workers import workers
+from walking_irl.cli.side_by_side import add_scheduler, side_by_side
 
 
 def add_parser(commands: Any) -> argparse.ArgumentParser:
     """The command's parser."""
     p: argparse.ArgumentParser = commands.add_parser(
-        "tables", help="regenerate the thesis's tables and two more"
+        "tables", help="regenerate the thesis's tables and more"
     )
-    p.add_argument("names", nargs="+", metavar="TABLE", help="7.1 ... 7.12, fig7.1, or all")
+    p.add_argument(
+        "names", nargs="+", metavar="TABLE", help="2.1, 3.1, 7.1 ... 7.13, fig7.1, or all"
+    )
     p.add_argument("--seeds", type=int, help="experts per cell")
+    add_scheduler(p)
     p.add_argument("--out", type=Path, default=Path("tables"), help="folder (%(default)s)")
     p.add_argument("--quiet", action="store_true", help="print the files' names only")
     return p
@@ -34,7 +37,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
             console.print(f"table {name}: {done} of {total} runs")
 
     try:
-        with workers() as executor:
+        with side_by_side(args.scheduler) as executor:
             paths = run_tables(
                 args.names, seeds=args.seeds, out=args.out, executor=executor, progress=progress
             )

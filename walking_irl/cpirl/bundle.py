@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from walking_irl.arrays import Array
 from walking_irl.cpirl.gauge import SAME, has_constant_sum
@@ -249,7 +249,7 @@ class Bundle:
     def quantile(self, n_tests: int) -> float:
         """Student's two-sided quantile for ``n_tests`` simultaneous intervals."""
         df = max(self.expert.n_samples - 1, 1) if self.expert.n_samples else 10**6
-        return float(student.ppf(1.0 - (1.0 - _CONFIDENCE) / (2 * n_tests), df))
+        return float(stdtrit(df, 1.0 - (1.0 - _CONFIDENCE) / (2 * n_tests)))
 
 
 def _checked(response: Response, K: int) -> Response:

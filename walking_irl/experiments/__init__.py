@@ -1,4 +1,4 @@
-"""Experiments: the thesis's tables 7.1 to 7.10 and figure 7.1, and two tables of the humanoid."""
+"""Experiments: the thesis's tables 2.1, 3.1, 7.1 to 7.10 and figure 7.1, and the humanoid's."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from walking_irl.experiments import (
     forward_methods,
     gridworld,
     humanoid,
+    inverse_optimal_control,
     irl_continuous,
     irl_methods,
     lqr,
@@ -41,6 +42,7 @@ TABLES: dict[str, tuple[Callable[[Any, Runner], Table], Any]] = {
     "7.10": (walking_path.table_7_10, walking_path.Config()),
     "7.11": (humanoid.table_7_11, humanoid.Config()),
     "7.12": (humanoid.table_7_12, humanoid.Config()),
+    "7.13": (inverse_optimal_control.table_7_13, inverse_optimal_control.Config()),
 }
 """What makes each table, and its default settings."""
 GROUPS = {"3.1": ("3.1a", "3.1b", "3.1c")}

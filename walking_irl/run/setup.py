@@ -12,6 +12,11 @@ from walking_irl.errors import InvalidInputError
 from walking_irl.geometry.centres import centre_rule
 from walking_irl.types import MODES
 
+TRAJECTORIES = 100
+"""Demonstrations of methods that read actions, unless a user asks for another number."""
+HORIZON = 50
+"""Steps of each."""
+
 
 @dataclass(frozen=True)
 class Setup:

@@ -1,11 +1,11 @@
 """The expert: the best gait for ground-truth weights, and what is recorded of it.
 
 Newton's method finds the minimum of a basin at once, so the price is the search for the basin: from
-the known gaits that are cheapest under the weights, from the reference, and from hops off the
-best, all at a low root penalty; the best basins go to the full one. A still lower penalty first
-lets a gait leave its basin for a better one, or a worse one: both are tried. Detours over the
-optimal gaits of neighbouring weights then find what a learner would find. An optimum that is no
-smooth minimum sits on a contact jump: it is perturbed and solved again.
+the known gaits that are cheapest under the weights and from the reference, all at a low root
+penalty; the best basins go to the full one. A still lower penalty first lets a gait leave its basin
+for a better one, or a worse one: both are tried. Detours over the optimal gaits of neighbouring
+weights then find what a learner would find. An optimum that is no smooth minimum sits on a contact
+jump: it is perturbed and solved again.
 """
 
 from __future__ import annotations
@@ -32,9 +32,7 @@ THERE, BACK = (stage(1e6, 15, 1e-4),), (stage(1e6, 25, 1e-6),)
 NEAREST = 4
 """Known gaits from which a search starts softly, the cheapest under the weights; the first of them
 and the reference also keep their basins."""
-HOPS = 2
-HOP = np.deg2rad(1.0)
-DETOUR = 0.1
+DETOUR = 0.05
 """How far detours go towards each corner of the simplex."""
 MAX_DETOURS = 3
 """Rounds of detours, as long as one finds a better gait."""
@@ -120,7 +118,7 @@ def best_gait(
     Args:
         spec: Which body, and its costs.
         w: Weights, shape (K,).
-        rng: Source of the hops.
+        rng: Source of perturbations.
         executor: Runs independent solves side by side.
         also: Further gait vectors to start from.
     """
@@ -131,8 +129,6 @@ def best_gait(
     starts = [(x, SOFTLY) for x in near] + [(near[0], APPROACH), (known[0].x, APPROACH)]
     jobs: list[Job] = [(x, stages, job.solver.dual(x)) for x, stages in starts]
     found = sorted(job.run([*jobs, *((x, APPROACH, None) for x in also)]), key=job.search_cost)
-    hops: list[Job] = [(job.hop(found[0], HOP, r), APPROACH, None) for r in rng.spawn(HOPS)]
-    found = sorted(found + job.run(hops), key=job.search_cost)
     raised = job.run([(s.x, FINISH, s.root) for s in _basins(found, job)])
     for _ in range(MAX_DETOURS):
         best = min(raised, key=job.cost)

@@ -34,6 +34,8 @@ PHYSICAL = 1e-3
 """Root penalty, in units of the cost, below which a gait can be walked as it is."""
 SMOOTH_DECREMENT = 1e-6
 """Undamped Newton decrement below which a gait counts as a smooth minimum."""
+ROUGH_DECREMENT = 1e-4
+"""And above which the exact Hessian says nothing of where the minimum moves."""
 
 
 @dataclass
@@ -208,6 +210,18 @@ class GaitSolver:
         if found.model is not None and found.model.undamped is not None:
             return _sensitivity(w, found.model.here.lin, found.model.undamped)
         return self.sensitivity(w, self.linearise(found.x), found.root)
+
+    def slope(self, w: Array, found: Solution) -> Array:
+        """Derivative dx / dw of a solution, shape (N nv + 2, K), by whatever Hessian there is.
+
+        Where it is no smooth minimum that is Gauss-Newton's: a direction, no derivative.
+        """
+        known = self.sensitivity_of(w, found)
+        if known is None or known[2] > ROUGH_DECREMENT:
+            lin = self.linearise(found.x)
+            matrix = half_hessian(lin.at(w, ROOT_PENALTY), self.structure, is_exact=False)
+            known = _sensitivity(w, lin, matrix.factor(UNDAMPED))
+        return known[1]
 
     def decrement(self, w: Array, lin: Linearisation, root: Array | None = None) -> float:
         """Undamped relative Newton decrement of a gait; inf where the Hessian is indefinite."""
