@@ -75,26 +75,37 @@ def level_of(outlook: Outlook, w: Array, tol: float, asked: float | None = None)
     """Level of the intervals around an estimate.
 
     The expert is allowed the upper end of what is measured; where noise hides more than it is
-    granted, and nothing shows that it needs more, what it is granted.
+    granted, and nothing shows that it needs more, what it is granted. What a person vouches for
+    counts, unless the lower end refutes it. A set of weights below a
+    tolerance is cut out at that level, or at the one that is asked for.
 
     Args:
         outlook: What is known at the end.
         w: The estimate, shape (K,).
         tol: Regret that counts as none, relative.
-        asked: Sub-optimality to allow instead, relative, or None.
+        asked: Sub-optimality to allow instead, relative to |w.mu_E|, or None.
     """
     bundle = outlook.bundle
-    scale, bracket = float(bundle.scale(w)), bracket_of(bundle, w)
-    granted, upper = bundle.expert.suboptimality, bracket.upper
+    none, bracket = tol * float(bundle.scale(w)), bracket_of(bundle, w)
+    gap, source = _allowed(bundle, bracket)
     if asked is not None:
-        gap, source = asked * scale, Gap.ASKED
-    elif upper <= granted or bracket.lower > granted:
-        gap, source = upper, Gap.MEASURED
-    else:
-        gap, source = granted, Gap.GRANTED
-    left = upper if bundle.is_exact else 0.0
-    solver = left + _beaten_by(bundle, _NEAR * max(gap + left, tol * scale))
-    return Level(gap, source, solver, tol * scale, bracket)
+        gap, source = asked * abs(float(w @ bundle.mu)), Gap.ASKED
+    if outlook.levels.is_set:
+        gap = gap if asked is not None else bundle.expert.suboptimality
+        return Level(max(gap, none), Gap.ASKED, 0.0, none, bracket)
+    left = bracket.upper if bundle.is_exact else 0.0
+    solver = left + _beaten_by(bundle, _NEAR * max(gap + left, none))
+    return Level(gap, source, solver, none, bracket)
+
+
+def _allowed(bundle: Bundle, bracket: Bracket) -> tuple[float, Gap]:
+    """How sub-optimal the expert may be above min f, and who says so."""
+    granted = bundle.expert.suboptimality
+    is_told = bool(bundle.expert.vouched_by)
+    is_hidden = not bundle.is_exact and bracket.upper > granted
+    if bracket.lower <= granted and (is_told or is_hidden):
+        return granted, Gap.GRANTED
+    return bracket.upper, Gap.MEASURED
 
 
 def _beaten_by(bundle: Bundle, near: float) -> float:

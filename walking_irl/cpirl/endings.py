@@ -1,15 +1,15 @@
 """Why a run of CPIRL ends: every ending is a rule, a small object or function that looks and says.
 
-The run's own rules look at its :class:`~walking_irl.cpirl.outlook.Outlook`, in three groups: on
-the regret as soon as there is an answer, on Newton's progress, and where no rule has a next query.
-Rules that a user adds (:class:`StopRule`) look at the iterations so far.
+They look at its :class:`~walking_irl.cpirl.outlook.Outlook`, in three groups: on the regret as soon
+as there is an answer, on Newton's progress, and where no rule has a next query. Whatever ended it,
+the bracket of min f says what that means. Rules that a user adds: :mod:`.stops`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from walking_irl.cpirl.levels import Levels
 from walking_irl.cpirl.newton_phase import MOST_POOR
 from walking_irl.cpirl.outlook import Decision, Ending, Outlook
 from walking_irl.errors import FlatPolyhedronError
-from walking_irl.types import Iteration, Status
+from walking_irl.types import Status
 
 EndRule = Callable[[Outlook], Ending | None]
 
@@ -239,74 +239,3 @@ def told_true(decision: Decision, outlook: Outlook, tol: float) -> Decision:
     if is_done and bracket.lower > none:
         return decision._replace(status=Status.NOT_OPTIMAL)
     return decision
-
-
-# On the iterations so far.
-
-
-class StopRule(Protocol):
-    """Decides after an iteration whether the run is over, and why."""
-
-    def __call__(self, history: Sequence[Iteration]) -> Status | None:
-        """Status to end with, or None to go on; ``history`` ends with the newest iteration."""
-        ...
-
-
-def stopped(
-    decision: Decision, rules: Sequence[StopRule], history: Sequence[Iteration]
-) -> Decision:
-    """The decision, or the end if a rule says so; a run that has ended is not asked."""
-    if decision.query is None:
-        return decision
-    found = (rule(history) for rule in rules)
-    status = next((s for s in found if s is not None), None)
-    return decision if status is None else decision._replace(query=None, status=status)
-
-
-@dataclass(frozen=True)
-class BudgetSpent:
-    """Stop once there were as many forward solves."""
-
-    max_solves: int
-
-    def __call__(self, history: Sequence[Iteration]) -> Status | None:
-        """See :class:`StopRule`."""
-        return Status.BUDGET if len(history) >= self.max_solves else None
-
-
-@dataclass(frozen=True)
-class CertificateBelow:
-    """Stop once some mixture of the policies found provably loses at most ``value``."""
-
-    value: float
-
-    def __call__(self, history: Sequence[Iteration]) -> Status | None:
-        """See :class:`StopRule`."""
-        return Status.GAP_CLOSED if history[-1].certificate <= self.value else None
-
-
-@dataclass(frozen=True)
-class IntervalsNarrowerThan:
-    """Stop once every weight is known to within ``width``."""
-
-    width: float
-
-    def __call__(self, history: Sequence[Iteration]) -> Status | None:
-        """See :class:`StopRule`."""
-        return Status.CONVERGED if history[-1].widest <= self.width else None
-
-
-@dataclass(frozen=True)
-class EstimateSettled:
-    """Stop once the estimate has moved by at most ``step`` (L1) in each of ``n`` iterations."""
-
-    step: float
-    n: int = 2
-
-    def __call__(self, history: Sequence[Iteration]) -> Status | None:
-        """See :class:`StopRule`."""
-        if len(history) <= self.n:
-            return None
-        w = np.array([i.estimate for i in history[-self.n - 1 :]])
-        moves = np.abs(np.diff(w, axis=0)).sum(axis=1)
-        return Status.CONVERGED if moves.max() <= self.step else None

@@ -39,10 +39,11 @@ class Levels(Protocol):
         """Level of the weights that explain the expert, shape (K,)."""
         ...
 
-    def probed(self, bundle: Bundle, level: float) -> Array:
+    def probed(self, bundle: Bundle, level: float, w: Array) -> Array:
         """Level that cuts the intervals {f <= level} out, shape (K,).
 
-        Cuts grant the expert its sub-optimality; here ``level``, in units of w.mu, says it all.
+        Cuts grant the expert its sub-optimality; here ``level``, in units of w.mu at the weights
+        ``w``, says it all.
         """
         ...
 
@@ -68,12 +69,10 @@ class Optimal:
             return np.zeros(bundle.K)
         return np.full(bundle.K, _BIAS_MARGIN * max(bundle.least_robust_regret, 0.0))
 
-    def probed(self, bundle: Bundle, level: float) -> Array:
+    def probed(self, bundle: Bundle, level: float, w: Array) -> Array:
         """See :class:`Levels`."""
         own = np.full(bundle.K, level - bundle.expert.suboptimality)
-        if bundle.is_exact and not self.is_set:
-            return own
-        return np.asarray(np.maximum(self.explaining(bundle), own))
+        return own if bundle.is_exact else np.maximum(self.explaining(bundle), own)
 
     def polyhedron(self, bundle: Bundle) -> WeightPolyhedron:
         """See :class:`Levels`."""
@@ -96,6 +95,12 @@ class Tolerance(Optimal):
         level: Array = self.tol * bundle.units
         return level
 
+    def probed(self, bundle: Bundle, level: float, w: Array) -> Array:
+        """See :class:`Levels`; relative to each weight's own return, as the tolerance is."""
+        relative = level / max(float(w @ np.abs(bundle.mu)), 1e-300)
+        own = relative * np.abs(bundle.mu) - bundle.expert.suboptimality
+        return np.asarray(np.maximum(self.explaining(bundle), own))
+
 
 @dataclass(frozen=True)
 class LeastRegret:
@@ -109,7 +114,7 @@ class LeastRegret:
         best = max(bundle.least_robust_regret, 0.0) if bundle.responses else 0.0
         return np.full(bundle.K, best)
 
-    def probed(self, bundle: Bundle, level: float) -> Array:
+    def probed(self, bundle: Bundle, level: float, w: Array) -> Array:
         """See :class:`Levels`."""
         own = level - bundle.expert.suboptimality
         if bundle.is_exact:

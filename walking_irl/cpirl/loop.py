@@ -29,21 +29,14 @@ import numpy as np
 
 from walking_irl.arrays import Array
 from walking_irl.cpirl.bundle import Bundle
-from walking_irl.cpirl.endings import (
-    BudgetSpent,
-    Endings,
-    StopRule,
-    ending,
-    endings_of,
-    stopped,
-    told_true,
-)
+from walking_irl.cpirl.endings import Endings, ending, endings_of, told_true
 from walking_irl.cpirl.levels import Levels, levels_of
 from walking_irl.cpirl.newton_phase import EstimatedNewton, ExactNewton, Measure, NewtonPhase
 from walking_irl.cpirl.outlook import Decision, Outlook, Query
 from walking_irl.cpirl.probes import Probes, Probing
 from walking_irl.cpirl.queries import Centres, kelley
 from walking_irl.cpirl.record import record
+from walking_irl.cpirl.stops import BudgetSpent, StopRule, stopped
 from walking_irl.errors import InvalidInputError
 from walking_irl.expert import check_expert
 from walking_irl.geometry.centres import OwnCentre, centre_rule

@@ -64,7 +64,7 @@ class Probes:
         level = self.level
         if probing is not None and level is not None:  # at the end, with weights to be sure of
             if outlook.levels.is_set:
-                self._queries = _until_reached(outlook, level.total)
+                self._queries = _until_reached(outlook, decision.estimate, level.total)
             else:
                 W = _one_for_each_bound(outlook, decision.estimate, level.total)
                 self._queries = _at(W, outlook, decision.estimate, level.total)
@@ -123,7 +123,7 @@ def _one_for_each_bound(outlook: Outlook, w: Array, level: float) -> Array:
     bundle = outlook.bundle
     if outlook.model is not None:
         return extremes(w, outlook.model.B, level, bundle.min_weight)
-    P = bundle.polyhedron(outlook.levels.probed(bundle, level))
+    P = bundle.polyhedron(outlook.levels.probed(bundle, level, w))
     return np.array([P.support(s * e)[1] for e in np.eye(bundle.K) for s in (1.0, -1.0)])
 
 
@@ -134,14 +134,14 @@ def _at(W: Array, outlook: Outlook, estimate: Array, level: float) -> Queries:
     """
     bundle = outlook.bundle
     for w in W:
-        P = bundle.polyhedron(outlook.levels.probed(bundle, level))
+        P = bundle.polyhedron(outlook.levels.probed(bundle, level, estimate))
         bundle = yield Query(w, Rule.PROBE, P)
     if outlook.model is None or not bundle.is_exact:
         return
     reach = np.abs(W - estimate)[np.arange(len(W)), np.arange(len(W)) // 2]
     for _ in range(_MOST_ROUNDS):
         for i in range(len(W)):
-            P = bundle.polyhedron(outlook.levels.probed(bundle, level))
+            P = bundle.polyhedron(outlook.levels.probed(bundle, level, estimate))
             end = P.support((1.0 if i % 2 == 0 else -1.0) * np.eye(bundle.K)[i // 2])[1]
             beyond = abs(end[i // 2] - estimate[i // 2]) / max(reach[i], 1e-300)
             if beyond > _MUCH_BEYOND:
@@ -149,10 +149,10 @@ def _at(W: Array, outlook: Outlook, estimate: Array, level: float) -> Queries:
                 bundle = yield Query(w, Rule.PROBE, P)
 
 
-def _until_reached(outlook: Outlook, level: float) -> Queries:
+def _until_reached(outlook: Outlook, estimate: Array, level: float) -> Queries:
     """Each end of each interval until the weights there are as good as the level says."""
     bundle = outlook.bundle
-    own = outlook.levels.probed(bundle, level)
+    own = outlook.levels.probed(bundle, level, estimate)
     for direction in np.vstack([np.eye(bundle.K), -np.eye(bundle.K)]):
         for _ in range(_MOST_PROBES):
             P = bundle.polyhedron(own)

@@ -65,7 +65,7 @@ def _intervals(
     if certainty is None or bundle.is_exact:
         own = outlook.levels.explaining(bundle)
         if level is not None:
-            own = outlook.levels.probed(bundle, level.total)
+            own = outlook.levels.probed(bundle, level.total, w)
         cuts = bundle.intervals(own, w)
         bounds = np.c_[np.minimum(bounds[:, 0], cuts[:, 0]), np.maximum(bounds[:, 1], cuts[:, 1])]
     return np.asarray(bounds)

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from walking_irl.arrays import Array
-from walking_irl.cpirl.endings import StopRule
 from walking_irl.cpirl.loop import cpirl
 from walking_irl.cpirl.newton_phase import Measure
 from walking_irl.cpirl.probes import Probing
+from walking_irl.cpirl.stops import StopRule
 from walking_irl.cpirl.summary import Summary, summarise
 from walking_irl.errors import InvalidInputError
 from walking_irl.geometry.centres import OwnCentre

@@ -18,6 +18,7 @@ from walking_irl.domains.contract import (
     refuse,
 )
 from walking_irl.domains.weights import normalised
+from walking_irl.errors import InvalidInputError
 from walking_irl.run.setup import Setup
 from walking_irl.types import Expert, Objective
 
@@ -146,6 +147,6 @@ def _refuse_small(w_E: Array, least: float, domain: Domain) -> None:
     ]
     if small:
         raise InvalidInputError(
-            f"weights below {least:g} are not looked for in {domain.name}: {', '.join(small)}; give "
-            f"larger ones, or lower the bound with --min-weight (now {least:g} of the sum)"
+            f"{domain.name} looks for weights of at least {least:g} of their sum, got "
+            f"{', '.join(small)}; give larger ones, or lower the bound with --min-weight"
         )
