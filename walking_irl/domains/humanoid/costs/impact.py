@@ -25,7 +25,7 @@ class Impact(Cost):
     scale: float = 0.91
     meaning: str = "Squared rate of the ground reaction force under each foot."
     formula: str = "|dF/dt|^2"
-    reference: float | None = 0.416
+    reference: float | None = 0.5
     planar_reference: float | None = 0.505
     rate: float = 10.0
 
