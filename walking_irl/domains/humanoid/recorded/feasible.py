@@ -54,7 +54,7 @@ class Feasible:
     Attributes:
         gait: The gait.
         total_costs: Its total costs G, shape (K,).
-        cost: w.G plus the pull towards the recording.
+        pull: tau times the squared distance from the recording.
         root: Its largest root force or moment [body weights; half a body weight times a metre].
         degrees: Distance of each joint from the recording [deg], sides as one.
         way: "down" from the recording or "up" from a known gait.
@@ -63,7 +63,7 @@ class Feasible:
 
     gait: Gait
     total_costs: Array
-    cost: float
+    pull: float
     root: float
     degrees: dict[str, float]
     way: str
@@ -116,7 +116,7 @@ def feasible_gait(
     return Feasible(
         gait=gait,
         total_costs=costs[best],
-        cost=total[best],
+        pull=pull[best],
         root=float(np.abs(solver.problem.evaluate(ends[best][1]).root).max()),
         degrees=degrees_apart(spec.walker, gait, shown),
         way=ends[best][0],

@@ -64,6 +64,14 @@ def read_person(paths: Sequence[Path], walker: Walker, options: Options | None =
     Raises:
         InvalidInputError: If a file is no recording of a walk; the message names it and says why.
     """
+    trials = read_trials(paths, walker, options)
+    return trials[0] if len(trials) == 1 else averaged(trials)
+
+
+def read_trials(
+    paths: Sequence[Path], walker: Walker, options: Options | None = None
+) -> list[Person]:
+    """The same, each trial by itself."""
     options = options or Options()
     tables = [read_table(path) for path in paths]
     plates = [t for t in tables if is_force_table(t)]
@@ -75,11 +83,10 @@ def read_person(paths: Sequence[Path], walker: Walker, options: Options | None =
             else "no recording of joint angles is given"
         )
     owner = [max(angles, key=lambda a, p=p: _alike(a.path, p.path)) for p in plates]  # type: ignore[misc]
-    trials = [
+    return [
         person_of(a, walker, options, [p for p, o in zip(plates, owner, strict=True) if o is a])
         for a in angles
     ]
-    return trials[0] if len(trials) == 1 else averaged(trials)
 
 
 def _alike(a: Path, b: Path) -> int:
