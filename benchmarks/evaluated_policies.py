@@ -28,8 +28,8 @@ import numpy as np
 from bench import table
 
 from walking_irl.arrays import Array
-from walking_irl.cpirl.endings import IntervalsNarrowerThan
 from walking_irl.cpirl.loop import cpirl
+from walking_irl.cpirl.stops import IntervalsNarrowerThan
 from walking_irl.domains.contract import Request
 from walking_irl.domains.humanoid.domain import Humanoid
 from walking_irl.domains.humanoid.learner import known_gaits, solver_for

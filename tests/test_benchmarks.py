@@ -20,6 +20,7 @@ ROWS = {
     ],
     "evaluated_policies": ["lqr, queries alone", "lqr, demonstration", "gridworld, iterates"],
     "forward_solver": ["gait solver, one iteration", "mujoco.minimize.least_squares"],
+    "growth": ["3-D, 40 knots, 6 objectives", "80 knots", "planar", "9 objectives"],
     "recovery": ["MuJoCo's inverse dynamics", "linear algebra", "Hessians", "queries"],
 }
 HEADLINES = {
@@ -28,6 +29,7 @@ HEADLINES = {
     "environment": r"^policy in the loop: \d\.\d\d of .* \(target >= 0\.5\): (met|NOT MET)$",
     "evaluated_policies": r"^lqr: \d+\.\d\d x fewer solves .*\n^gridworld: .* \(1 experts?\)$",
     "forward_solver": r"^one iteration takes .* \(target <= 33\): .*\n^derivatives are .* faster",
+    "growth": r"^2 threads: .*\n^time grows with the power .* \(target <= 1\.2\): (met|NOT MET)$",
     "recovery": r"^queries take \d+\.\d% of .* \(target <= 5 %\): (met|NOT MET)$",
 }
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, Literal, TypeVar
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from walking_irl.arrays import Array
 from walking_irl.errors import InvalidInputError
@@ -53,7 +53,7 @@ def half_widths(
         raise InvalidInputError("confidence must lie in (0, 1) and n_policies be positive")
     delta, deviation = 1.0 - confidence, returns.std(axis=0, ddof=1)
     if bound == "student":
-        quantile = float(student.ppf(1.0 - delta / (2 * K * n_policies), m - 1))
+        quantile = float(stdtrit(m - 1, 1.0 - delta / (2 * K * n_policies)))
         widths: Array = quantile * deviation / math.sqrt(m)
         return widths
     if bound not in ("bernstein", "hoeffding"):

@@ -71,6 +71,7 @@ class Expert:
         covariance: Covariance of the estimate ``mu``, shape (K, K), or None where it is exact.
         n_samples: Independent trajectories behind ``mu``; 0 where it is exact.
         demonstration: What was seen of the policy itself (for the humanoid a gait), or None.
+        vouched_by: Who vouches for ``suboptimality``, where it is a person's word.
     """
 
     mu: Array
@@ -79,6 +80,7 @@ class Expert:
     covariance: Array | None = None
     n_samples: int = 0
     demonstration: Any = None
+    vouched_by: str = ""
 
 
 class Status(enum.Enum):
@@ -92,6 +94,11 @@ class Status(enum.Enum):
     DOMINATED = "one policy is at least as good as the expert in every feature"
     MIXTURE_DOMINATES = "a mixture of the policies found is at least as good in every feature"
     EMPTY = "no weight satisfies every cut: the expert is not optimal, or its features are off"
+    NOT_OPTIMAL = "the expert is not exactly optimal for any weights; these explain it best"
+    CONTRADICTED = (
+        "the expert is not optimal, which this mode takes for granted: policies beat it under all "
+        "weights; ask for the least regret, mode minimise"
+    )
     STALLED = "the query repeats itself and the solver finds nothing better"
     BUDGET = "the budget of forward solves is spent"
 
@@ -102,6 +109,7 @@ class Status(enum.Enum):
             Status.MATCHED,
             Status.CONVERGED,
             Status.GAP_CLOSED,
+            Status.NOT_OPTIMAL,
             Status.DOMINATED,
             Status.MIXTURE_DOMINATES,
         )
@@ -109,7 +117,54 @@ class Status(enum.Enum):
     @property
     def has_weights(self) -> bool:
         """Whether a run that ended so has found weights to be sure of."""
-        return self in (Status.MATCHED, Status.CONVERGED, Status.GAP_CLOSED)
+        return self in (
+            Status.MATCHED,
+            Status.CONVERGED,
+            Status.GAP_CLOSED,
+            Status.NOT_OPTIMAL,
+        )
+
+
+class Bracket(NamedTuple):
+    """Bounds on min f, the sub-optimality that no weights explain, in units of w.mu."""
+
+    lower: float = 0.0
+    upper: float = np.inf
+
+    def is_closed(self, ratio: float) -> bool:
+        """Whether min f is known to be above 0, to within a ratio."""
+        return 0.0 < self.lower and self.upper <= ratio * self.lower
+
+
+class Gap(enum.Enum):
+    """Who says how sub-optimal an expert may be under its own weights."""
+
+    MEASURED = "measured"
+    GRANTED = "granted"
+    ASKED = "asked for"
+
+
+class Certainty(NamedTuple):
+    """Half widths of the weights' intervals by cause, (K,) each; they add up."""
+
+    from_noise: Array
+    """Of the expert's features: Student's quantile times ``standard_errors``."""
+    from_gap: Array
+    """What a sub-optimality of ``gap`` allows."""
+    from_solver: Array
+    """What the learner's own solver leaves."""
+    standard_errors: Array
+    """Of the weights, from noise."""
+    gap: float
+    """Sub-optimality of the expert that is allowed for, in units of w.mu."""
+    source: Gap
+    """Who says so."""
+
+    @property
+    def half_widths(self) -> Array:
+        """Of everything."""
+        whole: Array = self.from_noise + self.from_gap + self.from_solver
+        return whole
 
 
 class Rule(enum.Enum):
@@ -138,6 +193,8 @@ class Iteration:
         intervals: Per-weight bounds after this iteration's cut, shape (K, 2).
         estimate: Best estimate of the expert's weights after this iteration, shape (K,).
         status: Why this iteration was yielded.
+        bracket: Bounds on min f, noise in the expert's features included.
+        certainty: What the intervals are made of, or None before the end and where only cuts tell.
     """
 
     k: int
@@ -151,6 +208,8 @@ class Iteration:
     intervals: Array
     estimate: Array
     status: Status
+    bracket: Bracket = Bracket()
+    certainty: Certainty | None = None
 
     @property
     def widest(self) -> float:

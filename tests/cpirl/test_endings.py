@@ -7,10 +7,10 @@ import pytest
 
 from walking_irl.cpirl import endings
 from walking_irl.cpirl.bundle import Bundle
-from walking_irl.cpirl.endings import CertificateBelow, EstimateSettled, IntervalsNarrowerThan
 from walking_irl.cpirl.levels import levels_of
 from walking_irl.cpirl.loop import cpirl
 from walking_irl.cpirl.outlook import DeadEnd, Outlook, Progress
+from walking_irl.cpirl.stops import CertificateBelow, EstimateSettled, IntervalsNarrowerThan
 from walking_irl.domains.lqr import LQR
 from walking_irl.errors import EmptyPolyhedronError, FlatPolyhedronError, InvalidInputError
 from walking_irl.geometry.polyhedron import WeightPolyhedron
@@ -161,17 +161,19 @@ def test_noise_explains_a_step_only_once_the_defect_is_measured():
 
 
 def test_a_dead_end_says_why():
-    rules = endings.endings_of(levels_of("optimal", 1e-6), True, 1e-6).dead_end
     beaten, lone = ((2.0, 0.5), (0.5, 2.0)), ((1.5, 0.6),)
     cases = [
-        (DeadEnd(None, np.array([0.3, 0.7])), lone, Status.STALLED),
-        (DeadEnd(FlatPolyhedronError("flat")), lone, Status.GAP_CLOSED),
-        (DeadEnd(EmptyPolyhedronError("empty")), lone, Status.EMPTY),
-        (DeadEnd(EmptyPolyhedronError("empty")), beaten, Status.MIXTURE_DOMINATES),
+        (DeadEnd(None, np.array([0.3, 0.7])), lone, "optimal", Status.STALLED),
+        (DeadEnd(FlatPolyhedronError("flat")), lone, "optimal", Status.GAP_CLOSED),
+        (DeadEnd(EmptyPolyhedronError("empty")), lone, "optimal", Status.EMPTY),
+        (DeadEnd(EmptyPolyhedronError("empty")), beaten, "optimal", Status.CONTRADICTED),
+        (DeadEnd(EmptyPolyhedronError("empty")), beaten, "minimise", Status.MIXTURE_DOMINATES),
     ]
-    for dead_end, policies, expected in cases:
-        found = endings.ending(rules, outlook(*policies, dead_end=dead_end))
-        assert found.status is expected
+    for dead_end, policies, mode, expected in cases:
+        rules = endings.endings_of(levels_of(mode, 1e-6), True, 1e-6).dead_end
+        seen = outlook(*policies, mode=mode, dead_end=dead_end)
+        assert endings.ending(rules, seen).status is expected
+    rules = endings.endings_of(levels_of("optimal", 1e-6), True, 1e-6).dead_end
     np.testing.assert_array_equal(
         endings.ending(rules, outlook(*lone, dead_end=cases[0][0])).estimate, [0.3, 0.7]
     )

@@ -18,8 +18,13 @@ DOMAINS = ["lqr", "driving", "gridworld", pytest.param("walking-path", marks=slo
 def test_every_combination_ends_with_weights_and_intervals(domain, mode, expert):
     for centre in CENTRES if domain != "walking-path" else ["ac"]:
         report = run(Setup(domain=domain, centre=centre, mode=mode, expert=expert, seed=1))
-        is_told = report.ending in (Status.EMPTY, Status.BUDGET)
+        is_told = report.ending in (Status.EMPTY, Status.BUDGET, Status.CONTRADICTED)
         assert report.is_success or is_told, centre
+        if report.ending is Status.CONTRADICTED:
+            assert expert == "suboptimal" and mode != "minimise", centre
+            assert report.summary.bracket[0] > 0.0 and "minimise" in report.status, centre
+        elif report.is_success and mode != "minimise":  # its premise: optimal for some weights
+            assert report.summary.bracket[0] <= 1e-6 * np.abs(report.expert.mu).max(), centre
         assert report.w.min() >= 0 and report.w.sum() == pytest.approx(1)
         lower, upper = report.last.intervals.T
         assert (lower <= report.w + 1e-6).all() and (report.w <= upper + 1e-6).all(), centre

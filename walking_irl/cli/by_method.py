@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.markup import escape
@@ -12,11 +12,13 @@ from rich.table import Table
 from walking_irl.cli import DONE
 from walking_irl.errors import InvalidInputError
 from walking_irl.files import check_outputs, write_json
-from walking_irl.run.by_method import HORIZON, TRAJECTORIES, MethodReport, recover_by
-from walking_irl.run.setup import Setup
+from walking_irl.run.setup import HORIZON, TRAJECTORIES, Setup
 from walking_irl.workers import workers
 
-CPIRL_ONLY = ("centre", "mode", "max_solves")
+if TYPE_CHECKING:
+    from walking_irl.run.by_method import MethodReport
+
+CPIRL_ONLY = ("centre", "mode", "max_solves", "expert_gap", "min_weight")
 """Settings of a recovery that are CPIRL's own."""
 
 
@@ -46,6 +48,8 @@ def refuse_alone(args: argparse.Namespace) -> None:
 
 def run(args: argparse.Namespace, given: dict[str, Any], console: Console) -> int:
     """The recovery; ``given`` are the arguments of its setup."""
+    from walking_irl.run.by_method import recover_by  # all methods: not for every recovery
+
     own = [f"--{name.replace('_', '-')}" for name in CPIRL_ONLY if hasattr(args, name)]
     own += ["--resume"] if args.resume is not None else []
     own += ["--checkpoint"] if args.checkpoint is not None else []

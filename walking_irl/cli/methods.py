@@ -8,7 +8,6 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from walking_irl.baselines.registry import METHODS
 from walking_irl.cli import DONE
 
 
@@ -22,6 +21,8 @@ def add_parser(commands: Any) -> argparse.ArgumentParser:
 
 def run(args: argparse.Namespace, console: Console) -> int:
     """``walking-irl methods``."""
+    from walking_irl.baselines.registry import METHODS
+
     table = Table()
     table.add_column("method", no_wrap=True)
     for name in ("needs", "answers with", "forward solves", "guarantee", "worlds"):

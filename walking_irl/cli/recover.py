@@ -61,6 +61,21 @@ def add_parser(commands: Any) -> argparse.ArgumentParser:
         type=int,
         help="budget of forward solves (the domain's: walking-irl domains)",
     )
+    _setting(
+        how_found,
+        "--expert-gap",
+        type=float,
+        metavar="G",
+        help="your word that the expert is sub-optimal by at most this share of its return; 0: not "
+        "at all (what the run measures)",
+    )
+    _setting(
+        how_found,
+        "--min-weight",
+        type=float,
+        metavar="W",
+        help="least weight that is looked for, of a sum of 1 (the domain's)",
+    )
     how_found.add_argument(
         "--resume", type=Path, metavar="FILE.npz", help="go on from a checkpoint, as it began"
     )

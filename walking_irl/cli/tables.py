@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from walking_irl.cli import DONE, INTERRUPTED
-from walking_irl.workers import workers
+from walking_irl.cli.side_by_side import add_scheduler, side_by_side
 
 
 def add_parser(commands: Any) -> argparse.ArgumentParser:
@@ -22,6 +22,7 @@ def add_parser(commands: Any) -> argparse.ArgumentParser:
         "names", nargs="+", metavar="TABLE", help="2.1, 3.1, 7.1 ... 7.13, fig7.1, or all"
     )
     p.add_argument("--seeds", type=int, help="experts per cell")
+    add_scheduler(p)
     p.add_argument("--out", type=Path, default=Path("tables"), help="folder (%(default)s)")
     p.add_argument("--quiet", action="store_true", help="print the files' names only")
     return p
@@ -36,7 +37,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
             console.print(f"table {name}: {done} of {total} runs")
 
     try:
-        with workers() as executor:
+        with side_by_side(args.scheduler) as executor:
             paths = run_tables(
                 args.names, seeds=args.seeds, out=args.out, executor=executor, progress=progress
             )

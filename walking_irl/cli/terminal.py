@@ -145,6 +145,7 @@ def _show_certainty(report: Report, found: Summary, console: Console) -> None:
     else:
         span = f"{low:.1e} to {high:.1e}" if low > 0.0 else f"at most {high:.1e}"
         console.print(f"suboptimality of the expert: {span} (return, at its best weights)")
+    console.print(f"half widths: {found.how_sure}")
     console.print(f"weights: {found.rule}; {volume_left(found)} is left")
     if found.weakest is not None:
         console.print(

@@ -4,15 +4,15 @@
 immutable iteration per forward solve.
 """
 
-from walking_irl.cpirl.endings import (
+from walking_irl.cpirl.loop import cpirl
+from walking_irl.cpirl.probes import Probing
+from walking_irl.cpirl.recovery import Recovery, recover
+from walking_irl.cpirl.stops import (
     CertificateBelow,
     EstimateSettled,
     IntervalsNarrowerThan,
     StopRule,
 )
-from walking_irl.cpirl.loop import cpirl
-from walking_irl.cpirl.probes import Probing
-from walking_irl.cpirl.recovery import Recovery, recover
 from walking_irl.cpirl.summary import Summary, summarise
 
 __all__ = [

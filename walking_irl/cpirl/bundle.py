@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from walking_irl.arrays import Array
 from walking_irl.cpirl.gauge import SAME, has_constant_sum
@@ -19,6 +19,8 @@ from walking_irl.types import Expert, Response
 _CONFIDENCE = 0.95
 _ROUNDING = 1e-9
 """Of returns, whose features are of order 1 where they are not all zero."""
+_ZERO_MATTERS = 10.0
+"""How far from its zero, in differences of policies, a feature still is measured from there."""
 _UNREACHED = 0.02
 """By how much, relative to |w.mu_E|, an expert may beat every policy: noise or a local solver."""
 
@@ -71,7 +73,8 @@ class Bundle:
         W = np.vstack([self.W, w])
         bundle = replace(self, responses=(*self.responses, response), W=W, extra=extra)
         best, claimed = float(bundle.values(w)), float(w @ (self.mu - self.error))
-        if best < claimed - _UNREACHED * float(bundle.scale(w)) - _ROUNDING:
+        allowed = _UNREACHED * float(w @ np.maximum(np.abs(self.mu), 1e-3 * np.abs(bundle.M).max()))
+        if best < claimed - allowed - _ROUNDING:
             raise InvalidInputError(
                 f"no policy achieves the expert's features: for the weights {np.round(w, 4)} the "
                 f"best policy's return is {best:.6g}, the expert's {claimed:.6g}; check the "
@@ -132,16 +135,39 @@ class Bundle:
         return game_lp(self.differences, self.min_weight) if self.min_weight else self.game
 
     @cached_property
+    def nominal_game(self) -> Game:
+        """As :attr:`bounded_game`, against the expert's mean without its error bars."""
+        if not self.error.any():
+            return self.bounded_game
+        return game_lp(self.policies - self.mu, self.min_weight)
+
+    @cached_property
+    def spread(self) -> float:
+        """By how much a query's policy differs from the expert in a feature; its size if none."""
+        size, apart = (float(np.abs(v).max(initial=0.0)) for v in (self.mu, self.M - self.mu))
+        return max(apart if apart > _ROUNDING * size else size, 1e-300)
+
+    @cached_property
+    def units(self) -> Array:
+        """Units of relative tolerances, shape (K,): |mu_E|, or the policies' differences.
+
+        A constant that is added to a feature of all policies changes no answer, so that it must not
+        loosen a tolerance: ten times what policies differ by is the most.
+        """
+        units: Array = np.minimum(np.abs(self.mu), _ZERO_MATTERS * self.spread)
+        return units
+
+    @cached_property
     def unit(self) -> float:
-        """The expert's largest feature: the unit of returns whatever the weights."""
-        return max(float(np.abs(self.mu).max()), 1e-300)
+        """The largest of the :attr:`units`: the unit of returns whatever the weights."""
+        return max(float(self.units.max()), 1e-300)
 
     def scale(self, w: Array) -> Array:
-        """|w.mu_E|, the unit of relative tolerances; (..., K) -> (...).
+        """The unit of relative tolerances under weights ``w``; (..., K) -> (...).
 
-        At least a thousandth of the largest feature found: an expert's may all be zero.
+        At least a thousandth of what policies differ by: an expert's features may all be zero.
         """
-        unit: Array = np.maximum(w @ np.abs(self.mu), 1e-3 * np.abs(self.M).max(initial=0.0))
+        unit: Array = np.maximum(w @ self.units, 1e-3 * self.spread)
         return unit
 
     def values(self, w: Array) -> Array:
@@ -212,7 +238,8 @@ class Bundle:
         are those for which the expert is at least as close to optimal as for the estimate.
         """
         f = max(float(self.values(estimate) - estimate @ (self.mu + self.error)), 0.0)
-        for least in (0.0, f, f + 1e-6 * self.unit):
+        f -= self.expert.suboptimality  # which the cuts grant
+        for least in (-np.inf, f, f + 1e-6 * self.unit):
             try:
                 return self.polyhedron(np.maximum(level, least)).intervals()
             except (EmptyPolyhedronError, SolverError):
@@ -222,7 +249,7 @@ class Bundle:
     def quantile(self, n_tests: int) -> float:
         """Student's two-sided quantile for ``n_tests`` simultaneous intervals."""
         df = max(self.expert.n_samples - 1, 1) if self.expert.n_samples else 10**6
-        return float(student.ppf(1.0 - (1.0 - _CONFIDENCE) / (2 * n_tests), df))
+        return float(stdtrit(df, 1.0 - (1.0 - _CONFIDENCE) / (2 * n_tests)))
 
 
 def _checked(response: Response, K: int) -> Response:

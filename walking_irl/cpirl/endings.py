@@ -1,25 +1,26 @@
 """Why a run of CPIRL ends: every ending is a rule, a small object or function that looks and says.
 
-The run's own rules look at its :class:`~walking_irl.cpirl.outlook.Outlook`, in three groups: on
-the regret as soon as there is an answer, on Newton's progress, and where no rule has a next query.
-Rules that a user adds (:class:`StopRule`) look at the iterations so far.
+They look at its :class:`~walking_irl.cpirl.outlook.Outlook`, in three groups: on the regret as soon
+as there is an answer, on Newton's progress, and where no rule has a next query. Whatever ended it,
+the bracket of min f says what that means. Rules that a user adds: :mod:`.stops`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
 from walking_irl.arrays import Array
+from walking_irl.cpirl.certainty import bracket_of
 from walking_irl.cpirl.gauge import gauge_fixed
 from walking_irl.cpirl.levels import Levels
 from walking_irl.cpirl.newton_phase import MOST_POOR
 from walking_irl.cpirl.outlook import Decision, Ending, Outlook
 from walking_irl.errors import FlatPolyhedronError
-from walking_irl.types import Iteration, Status
+from walking_irl.types import Status
 
 EndRule = Callable[[Outlook], Ending | None]
 
@@ -29,6 +30,9 @@ _EXACT_STEP, _ESTIMATED_STEP = 2e-4, 1e-3
 """Newton step (L1) that counts as none."""
 _BEATEN = -1e-8
 """Certificate, relative to the expert's features, that proves that a mixture beats it."""
+_CLOSED = 3.0
+"""Ratio of the ends of min f's bracket, the lower above 0, below which there is little to learn:
+half widths, which follow its root, would become narrower by sqrt(3) at most."""
 
 
 class Endings(NamedTuple):
@@ -143,7 +147,10 @@ def gains_nothing(outlook: Outlook) -> Ending | None:
     """Poor steps where the regret is as low as the demonstration's own gap may be."""
     progress = outlook.progress
     assert progress is not None
-    is_over = progress.n_poor >= MOST_POOR and progress.gap <= _FLOOR
+    is_low = progress.gap <= _FLOOR
+    if not is_low and progress.n_poor >= MOST_POOR:
+        is_low = bracket_of(outlook.bundle, progress.target).is_closed(_CLOSED)
+    is_over = progress.n_poor >= MOST_POOR and is_low
     return Ending(Status.CONVERGED) if is_over else None
 
 
@@ -216,76 +223,37 @@ def is_flat(outlook: Outlook) -> Ending | None:
 
 def is_empty(outlook: Outlook) -> Ending | None:
     """No weights are left: a mixture beats the expert, or its features are off."""
-    is_beaten = outlook.bundle.game.value < _BEATEN * outlook.bundle.unit
-    return Ending(Status.MIXTURE_DOMINATES if is_beaten else Status.EMPTY)
+    if outlook.bundle.game.value >= _BEATEN * outlook.bundle.unit:
+        return Ending(Status.EMPTY)
+    is_asked = not outlook.levels.has_known_minimum
+    return Ending(Status.MIXTURE_DOMINATES if is_asked else Status.CONTRADICTED)
 
 
-# On the iterations so far.
+# What an ending means, by the bracket of min f.
+
+_UNFINISHED = (Status.BUDGET, Status.STALLED, Status.EMPTY)
 
 
-class StopRule(Protocol):
-    """Decides after an iteration whether the run is over, and why."""
+def told_true(decision: Decision, outlook: Outlook, tol: float) -> Decision:
+    """The ending in the light of what is known of min f; a run that goes on is not asked.
 
-    def __call__(self, history: Sequence[Iteration]) -> Status | None:
-        """Status to end with, or None to go on; ``history`` ends with the newest iteration."""
-        ...
+    Where the bracket has closed nothing is left to ask, whatever ended the run. Modes that take
+    min f to be 0 are contradicted by an exact expert whose lower bound is above what it is granted;
+    one above the tolerance says that the expert is not exactly optimal.
 
-
-def stopped(
-    decision: Decision, rules: Sequence[StopRule], history: Sequence[Iteration]
-) -> Decision:
-    """The decision, or the end if a rule says so; a run that has ended is not asked."""
-    if decision.query is None:
+    Args:
+        decision: What is believed.
+        outlook: What is known.
+        tol: Regret that counts as none, relative.
+    """
+    bundle, status, takes_zero = outlook.bundle, decision.status, outlook.levels.has_known_minimum
+    if decision.query is not None or not (status.has_weights or status in _UNFINISHED):
         return decision
-    found = (rule(history) for rule in rules)
-    status = next((s for s in found if s is not None), None)
-    return decision if status is None else decision._replace(query=None, status=status)
-
-
-@dataclass(frozen=True)
-class BudgetSpent:
-    """Stop once there were as many forward solves."""
-
-    max_solves: int
-
-    def __call__(self, history: Sequence[Iteration]) -> Status | None:
-        """See :class:`StopRule`."""
-        return Status.BUDGET if len(history) >= self.max_solves else None
-
-
-@dataclass(frozen=True)
-class CertificateBelow:
-    """Stop once some mixture of the policies found provably loses at most ``value``."""
-
-    value: float
-
-    def __call__(self, history: Sequence[Iteration]) -> Status | None:
-        """See :class:`StopRule`."""
-        return Status.GAP_CLOSED if history[-1].certificate <= self.value else None
-
-
-@dataclass(frozen=True)
-class IntervalsNarrowerThan:
-    """Stop once every weight is known to within ``width``."""
-
-    width: float
-
-    def __call__(self, history: Sequence[Iteration]) -> Status | None:
-        """See :class:`StopRule`."""
-        return Status.CONVERGED if history[-1].widest <= self.width else None
-
-
-@dataclass(frozen=True)
-class EstimateSettled:
-    """Stop once the estimate has moved by at most ``step`` (L1) in each of ``n`` iterations."""
-
-    step: float
-    n: int = 2
-
-    def __call__(self, history: Sequence[Iteration]) -> Status | None:
-        """See :class:`StopRule`."""
-        if len(history) <= self.n:
-            return None
-        w = np.array([i.estimate for i in history[-self.n - 1 :]])
-        moves = np.abs(np.diff(w, axis=0)).sum(axis=1)
-        return Status.CONVERGED if moves.max() <= self.step else None
+    none = tol * float(bundle.scale(decision.estimate))
+    bracket = bracket_of(bundle, decision.estimate)
+    if takes_zero and bundle.is_exact and bracket.lower > max(bundle.expert.suboptimality, none):
+        return decision._replace(status=Status.CONTRADICTED)
+    is_done = takes_zero if status.has_weights else bracket.is_closed(_CLOSED)
+    if is_done and bracket.lower > none:
+        return decision._replace(status=Status.NOT_OPTIMAL)
+    return decision

@@ -39,8 +39,12 @@ class Levels(Protocol):
         """Level of the weights that explain the expert, shape (K,)."""
         ...
 
-    def probed(self, bundle: Bundle, level: float) -> Array:
-        """Level of probed intervals: ``level``, relative, and never below the cuts'; (K,)."""
+    def probed(self, bundle: Bundle, level: float, w: Array) -> Array:
+        """Level that cuts the intervals {f <= level} out, shape (K,).
+
+        Cuts grant the expert its sub-optimality; here ``level``, in units of w.mu at the weights
+        ``w``, says it all.
+        """
         ...
 
     def polyhedron(self, bundle: Bundle) -> WeightPolyhedron:
@@ -65,10 +69,10 @@ class Optimal:
             return np.zeros(bundle.K)
         return np.full(bundle.K, _BIAS_MARGIN * max(bundle.least_robust_regret, 0.0))
 
-    def probed(self, bundle: Bundle, level: float) -> Array:
+    def probed(self, bundle: Bundle, level: float, w: Array) -> Array:
         """See :class:`Levels`."""
-        both: Array = np.maximum(self.explaining(bundle), level * np.abs(bundle.mu))
-        return both
+        own = np.full(bundle.K, level - bundle.expert.suboptimality)
+        return own if bundle.is_exact else np.maximum(self.explaining(bundle), own)
 
     def polyhedron(self, bundle: Bundle) -> WeightPolyhedron:
         """See :class:`Levels`."""
@@ -88,8 +92,14 @@ class Tolerance(Optimal):
 
     def explaining(self, bundle: Bundle) -> Array:
         """See :class:`Levels`."""
-        level: Array = self.tol * np.abs(bundle.mu)
+        level: Array = self.tol * bundle.units
         return level
+
+    def probed(self, bundle: Bundle, level: float, w: Array) -> Array:
+        """See :class:`Levels`; relative to each weight's own return, as the tolerance is."""
+        relative = level / max(float(w @ np.abs(bundle.mu)), 1e-300)
+        own = relative * np.abs(bundle.mu) - bundle.expert.suboptimality
+        return np.asarray(np.maximum(self.explaining(bundle), own))
 
 
 @dataclass(frozen=True)
@@ -104,10 +114,12 @@ class LeastRegret:
         best = max(bundle.least_robust_regret, 0.0) if bundle.responses else 0.0
         return np.full(bundle.K, best)
 
-    def probed(self, bundle: Bundle, level: float) -> Array:
+    def probed(self, bundle: Bundle, level: float, w: Array) -> Array:
         """See :class:`Levels`."""
-        both: Array = self.explaining(bundle) + level * np.abs(bundle.mu)
-        return both
+        own = level - bundle.expert.suboptimality
+        if bundle.is_exact:
+            return np.full(bundle.K, own)
+        return self.explaining(bundle) + max(own, 0.0)
 
     def polyhedron(self, bundle: Bundle) -> WeightPolyhedron:
         """Weights that may still lower the regret, be it below 0, as noisy features allow.

@@ -29,13 +29,14 @@ import numpy as np
 
 from walking_irl.arrays import Array
 from walking_irl.cpirl.bundle import Bundle
-from walking_irl.cpirl.endings import BudgetSpent, Endings, StopRule, ending, endings_of, stopped
+from walking_irl.cpirl.endings import Endings, ending, endings_of, told_true
 from walking_irl.cpirl.levels import Levels, levels_of
 from walking_irl.cpirl.newton_phase import EstimatedNewton, ExactNewton, Measure, NewtonPhase
 from walking_irl.cpirl.outlook import Decision, Outlook, Query
 from walking_irl.cpirl.probes import Probes, Probing
 from walking_irl.cpirl.queries import Centres, kelley
 from walking_irl.cpirl.record import record
+from walking_irl.cpirl.stops import BudgetSpent, StopRule, stopped
 from walking_irl.errors import InvalidInputError
 from walking_irl.expert import check_expert
 from walking_irl.geometry.centres import OwnCentre, centre_rule
@@ -75,9 +76,9 @@ def cpirl(
         rng: Used by sampling centres, and to move a centre that repeats itself.
         measure: Maps a policy to the mean (K,) and covariance (K, K) of its features when measured
             as an estimated expert's were; the difference to its ``mu`` corrects the expert.
-        probe: Relative regret whose extreme weights are solved for at the end (with an executor:
-            :class:`Probing`), or None for no probes: one solve for each of the 2K bounds, in "set"
-            mode until each bound is reached.
+        probe: Sub-optimality of the expert, relative to |w.mu_E|, whose extreme weights are solved
+            for at the end (:class:`Probing` for that which is measured), or None for no probes: one
+            solve for each of the 2K bounds, in "set" mode until each bound is reached.
         stop: Further stop rules.
 
     Yields:
@@ -90,7 +91,8 @@ def cpirl(
     probing = Probing(probe) if isinstance(probe, int | float) else probe
     if bracket is not None and (mode != "minimise" or not bracket > 0.0):
         raise InvalidInputError("a bracket is a positive number, for the minimise mode only")
-    if not tol > 0.0 or max_solves < 1 or (probing is not None and not probing.level > 0.0):
+    asked = None if probing is None else probing.level
+    if not tol > 0.0 or max_solves < 1 or (asked is not None and not asked > 0.0):
         raise InvalidInputError("tol, max_solves and probe must be positive")
     levels = levels_of(mode, tol)
     check_expert(expert)
@@ -109,11 +111,12 @@ def cpirl(
         outlook, decision = search.decide(bundle, query.rule)  # step 5, and step 2 of the next
         bundle = outlook.bundle  # a measured defect may have corrected the expert
         iteration = record(len(history), query, outlook, decision)
-        decision = stopped(decision, rules, [*history, iteration])
+        decision = told_true(stopped(decision, rules, [*history, iteration]), outlook, tol)
+        probes = Probes(outlook, decision, probing, tol)
+        if decision.query is None:
+            iteration = record(len(history), query, outlook, decision, probes.level)
         query = decision.query
-        probes = Probes(outlook, decision, probing if query is None else None)
-        status = decision.status if probes.is_over else Status.CUT
-        history.append(replace(iteration, status=status))
+        history.append(replace(iteration, status=decision.status if probes.is_over else Status.CUT))
         yield history[-1]
     yield from probes.run(forward, len(history))
 

@@ -145,8 +145,12 @@ class EstimatedNewton:
         """See :class:`NewtonPhase`; once near, for good."""
         if not _has_sensitivity(bundle):
             return None
+        # How perturbations are paid for is a defect that no weights explain: it is in min f, too.
+        unexplained = max(-bundle.nominal_game.value / bundle.unit, self.levels.lower_bound(bundle))
         self._is_near = (
-            self._is_near or bundle.least_robust_regret <= 0.0 or _is_near(bundle, self.levels)
+            self._is_near
+            or bundle.least_robust_regret <= 0.0
+            or float(bundle.relative_regrets.min()) - unexplained <= _NEWTON_GAP
         )
         if not self._is_near:
             return None

@@ -10,17 +10,17 @@ from typing import Any
 import numpy as np
 
 from walking_irl.arrays import Array
-from walking_irl.cpirl.endings import StopRule
 from walking_irl.cpirl.loop import cpirl
 from walking_irl.cpirl.newton_phase import Measure
 from walking_irl.cpirl.probes import Probing
+from walking_irl.cpirl.stops import StopRule
 from walking_irl.cpirl.summary import Summary, summarise
 from walking_irl.errors import InvalidInputError
 from walking_irl.geometry.centres import OwnCentre
 from walking_irl.types import Expert, Forward, Iteration, Mode, Objective, Status
 
-PROBE = 1e-4
-"""Relative regret of the weights that the intervals contain, where features are exact."""
+MEASURED = Probing()
+"""Intervals that allow for what is measured of the expert's sub-optimality."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ def recover(
     min_weight: float = 0.0,
     rng: np.random.Generator | None = None,
     measure: Measure | None = None,
-    probe: float | Probing | None = PROBE,
+    probe: float | Probing | None = MEASURED,
     executor: Executor | None = None,
     stop: Sequence[StopRule] = (),
 ) -> Recovery:
@@ -104,7 +104,8 @@ def recover(
         min_weight: Lower bound of every weight.
         rng: Of sampling centres; by default one of seed 0, so that equal calls have equal results.
         measure: Measures a policy as an estimated expert was measured.
-        probe: Relative regret whose extreme weights are solved for at the end, None for no probes.
+        probe: Sub-optimality of the expert that the intervals allow for, relative; what is measured
+            by default, None for no probes.
         executor: Solves the probes side by side.
         stop: Further stop rules.
 
@@ -118,8 +119,8 @@ def recover(
     K = np.size(expert.mu)
     if objectives is not None and len(objectives) != K:
         raise InvalidInputError(f"need {K} objectives, one for each feature, got {len(objectives)}")
-    if executor is not None and probe is not None and not isinstance(probe, Probing):
-        probe = Probing(probe, executor)
+    if executor is not None and probe is not None:
+        probe = Probing(probe.level if isinstance(probe, Probing) else probe, executor)
     described = [Objective(o, "1", 1.0, o) if isinstance(o, str) else o for o in objectives or ()]
     iterations = tuple(
         cpirl(

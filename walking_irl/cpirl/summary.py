@@ -10,11 +10,14 @@ import numpy as np
 from walking_irl.arrays import Array
 from walking_irl.cpirl.gauge import freedom_in_words
 from walking_irl.cpirl.regret_model import reduced
+from walking_irl.cpirl.wording import ending_in_words, how_sure
 from walking_irl.errors import InvalidInputError
 from walking_irl.geometry.plane import plane_basis
 from walking_irl.geometry.polyhedron import EXACT_OBJECTIVES, WeightPolyhedron
-from walking_irl.types import Expert, Iteration, Objective, Status
+from walking_irl.types import Certainty, Expert, Iteration, Objective, Status
 
+TOLERANCE = 1e-6
+"""Regret that counts as none, relative to |w.mu_E|, unless a run is told otherwise."""
 _ROUNDING = 1e-13
 """Returns below this, relative to the expert's largest feature, are reported as 0."""
 
@@ -29,8 +32,8 @@ class Summary:
         intervals: Per-weight bounds, shape (K, 2), relative to the policies evaluated.
         physical_intervals: The same per raw unit of each cost, w_j / scale_j [1/unit], (K, 2).
         certificate: Some mixture of the policies found loses at most this much to the expert.
-        bracket: (-t_k, best regret): bounds on the least regret of any weights; 0 inside means
-            that the expert may be optimal.
+        bracket: Bounds on the least regret of any weights, noise in the expert's features included;
+            0 inside means that the expert may be optimal.
         volume_ratio: Volume of the last polyhedron over the whole simplex's; above 7 weights an
             estimate, as a rule too small by a factor of 1.3 to 100.
         condition_number: Of the regret's Hessian, or None where no sensitivity is known.
@@ -39,6 +42,9 @@ class Summary:
         noise: Confidence half-widths of the expert's features, shape (K,).
         n_solves: Forward solves, probes included.
         status: Why the run ended.
+        ending: The same in words, with figures.
+        certainty: What the half widths of the weights are made of, or None where only cuts tell.
+        how_sure: The same in words.
     """
 
     w: Array
@@ -54,6 +60,9 @@ class Summary:
     noise: Array
     n_solves: int
     status: Status
+    ending: str
+    certainty: Certainty | None
+    how_sure: str
 
 
 def summarise(
@@ -77,8 +86,8 @@ def summarise(
     scales = np.array([o.scale for o in objectives] or np.ones(K))
     condition, weakest = _identifiability(iterations, names)
     rounding = _ROUNDING * float(np.abs(expert.mu).max())
-    certificate, regret = (
-        0.0 if abs(value) <= rounding else value for value in (last.certificate, last.best_regret)
+    certificate, low, high = (
+        0.0 if abs(value) <= rounding else value for value in (last.certificate, *last.bracket)
     )
     whole = WeightPolyhedron.simplex(K, last.polyhedron.min_weight)
     return Summary(
@@ -87,7 +96,7 @@ def summarise(
         intervals=last.intervals,
         physical_intervals=last.intervals / scales[:, None],
         certificate=certificate,
-        bracket=(0.0 - certificate, regret),
+        bracket=(low, high),
         volume_ratio=last.polyhedron.volume() / whole.volume(),
         condition_number=condition,
         weakest=weakest,
@@ -95,6 +104,9 @@ def summarise(
         noise=np.asarray(expert.error),
         n_solves=len(iterations),
         status=last.status,
+        ending=ending_in_words(iterations, expert, TOLERANCE),
+        certainty=last.certainty,
+        how_sure=how_sure(last, expert),
     )
 
 

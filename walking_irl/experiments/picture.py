@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from html import escape
 from itertools import groupby
 from textwrap import wrap
 from typing import NamedTuple
 
 from walking_irl.arrays import Array
+from walking_irl.experiments.svg import BASELINE, FAINT, INK, OURS
+from walking_irl.experiments.svg import line as _line
+from walking_irl.experiments.svg import svg as _svg
+from walking_irl.experiments.svg import text as _text
 
-OURS, BASELINE, FAINT, INK = "#3b6fb6", "#9a9a9a", "#e2e2e2", "#222222"
 ROW, LABELS, PLOT, RESULT = 20, 270, 420, 90
 """Height of a row; widths of labels, of the plot and of the results beside it [px]."""
 
@@ -220,25 +222,3 @@ def _numbers(cell: str) -> tuple[float, float]:
     """Mean and standard error of "mean +- s.e." or "mean"."""
     mean, _, error = cell.partition(" +- ")
     return float(mean), float(error or 0.0)
-
-
-def _svg(title: str, width: float, height: float, body: Sequence[str]) -> str:
-    head = (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:g} {height:g}" '
-        f'width="{width:g}" height="{height:g}" font-family="sans-serif" font-size="12">'
-    )
-    paper = f'<rect width="{width:g}" height="{height:g}" fill="white"/>'
-    return "\n".join([head, paper, _text(8, 20, title, weight="bold"), *body, "</svg>", ""])
-
-
-def _text(
-    x: float, y: float, text: str, anchor: str = "start", weight: str = "normal", colour: str = INK
-) -> str:
-    return (
-        f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" font-weight="{weight}" '
-        f'fill="{colour}">{escape(text)}</text>'
-    )
-
-
-def _line(x1: float, y1: float, x2: float, y2: float, colour: str) -> str:
-    return f'<line x1="{x1:.1f}" y1="{y1:.1f}" x2="{x2:.1f}" y2="{y2:.1f}" stroke="{colour}"/>'

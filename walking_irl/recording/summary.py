@@ -37,9 +37,14 @@ def summary(
 
 
 def _result(experiment: Experiment, found: Summary) -> str:
-    text = f"**{found.n_solves} iterations**: {found.status.value}."
+    text = f"**{found.n_solves} iterations**: {found.ending}."
     if found.status in (Status.DOMINATED, Status.MIXTURE_DOMINATES):
-        return text + " No weights make this expert optimal; those below bring it nearest to it."
+        low, high = found.bracket
+        is_closed = low > 0.0 and high <= 1.5 * low
+        nearest = (
+            "those below bring it nearest to it" if is_closed else "none was looked for further"
+        )
+        return f"{text} No weights make this expert optimal; {nearest}."
     if experiment.w_expert is not None:
         l1 = float(np.abs(found.w - experiment.w_expert).sum())
         text += f" Ground-truth weights recovered to {l1:.4f} (sum of absolute errors)."
@@ -69,6 +74,7 @@ def _certainty(experiment: Experiment, found: Summary) -> str:
         f"The weights shown: {found.rule}.",
         f"The least regret of any weights lies between {low:.1e} and {high:.1e}; "
         "an expert that is optimal for some weights needs 0 in between.",
+        f"Half widths of the weights: {found.how_sure}.",
         f"The cuts leave {volume_left(found)} weights.",
     ]
     if found.weakest is not None:
@@ -127,6 +133,7 @@ def properties(experiment: Experiment, found: Summary | None, ending: str | None
             "status": found.status.name.lower(),
             "certificate": found.certificate,
             "bracket": found.bracket,
+            "how_sure": found.how_sure,
             "volume_ratio": found.volume_ratio,
             "condition_number": found.condition_number,
             "weakest": found.weakest,

@@ -19,13 +19,8 @@ from walking_irl.errors import InvalidInputError
 from walking_irl.rl.demonstrations import Demonstrations, demonstrate
 from walking_irl.rl.finite_mdp import FiniteMDP
 from walking_irl.run.problem import Problem, prepare
-from walking_irl.run.setup import Setup
+from walking_irl.run.setup import HORIZON, TRAJECTORIES, Setup
 from walking_irl.types import Expert
-
-TRAJECTORIES = 100
-"""Demonstrations of methods that read actions, unless a user asks for another number."""
-HORIZON = 50
-"""Steps of each."""
 
 
 @dataclass(frozen=True)

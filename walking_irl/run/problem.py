@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from walking_irl.domains.contract import (
     refuse,
 )
 from walking_irl.domains.weights import normalised
+from walking_irl.errors import InvalidInputError
 from walking_irl.run.setup import Setup
 from walking_irl.types import Expert, Objective
 
@@ -56,6 +57,12 @@ class Problem:
         """Ground-truth weights, shape (K,), or None where nobody knows them."""
         truth = self.demonstration.truth
         return None if truth is None else truth.w
+
+    @property
+    def min_weight(self) -> float:
+        """The learner's lower bound of every weight, the domain's where none was asked for."""
+        asked = self.setup.min_weight
+        return self.domain.defaults.min_weight if asked is None else asked
 
     @property
     def max_solves(self) -> int:
@@ -97,6 +104,10 @@ def pose(
 ) -> Problem:
     """The problem of explaining an expert that is known already."""
     domain = load(setup.domain)
+    if setup.expert_gap is not None:
+        demonstration = replace(
+            demonstration, expert=_vouched(demonstration.expert, setup.expert_gap)
+        )
     learner = domain.learner(
         demonstration.expert,
         setup.options,
@@ -107,9 +118,35 @@ def pose(
     return Problem(setup, domain, demonstration, learner)
 
 
+def _vouched(expert: Expert, gap: float) -> Expert:
+    """The expert, as sub-optimal as a person says, relative to its return."""
+    size = float(np.mean(np.abs(expert.mu)))
+    return replace(expert, suboptimality=gap * size, vouched_by="--expert-gap")
+
+
 def _request(setup: Setup, domain: Domain) -> Request:
     if setup.weights is None:
         return Request(None, setup.expert, setup.options)
     w_E = normalised(setup.weights, domain.objectives)
+    low = domain.defaults.min_weight if setup.min_weight is None else setup.min_weight
+    _refuse_small(w_E, low, domain)
     refuse(setup.options, ["population"], "weights are given, so none are drawn")
     return Request(w_E, setup.expert, setup.options)
+
+
+def _refuse_small(w_E: Array, least: float, domain: Domain) -> None:
+    """Complain about ground-truth weights that the learner does not look for.
+
+    Raises:
+        InvalidInputError: If there are some.
+    """
+    small = [
+        f"{objective.name} {w:.4g}"
+        for objective, w in zip(domain.objectives, w_E, strict=True)
+        if w < least - 1e-12
+    ]
+    if small:
+        raise InvalidInputError(
+            f"{domain.name} looks for weights of at least {least:g} of their sum, got "
+            f"{', '.join(small)}; give larger ones, or lower the bound with --min-weight"
+        )

@@ -11,7 +11,7 @@ from walking_irl.arrays import Array
 from walking_irl.cpirl.summary import Summary, summarise
 from walking_irl.errors import InvalidInputError, WalkingIRLError
 from walking_irl.run.problem import Problem
-from walking_irl.types import Expert, Iteration, Objective, Rule, Status
+from walking_irl.types import Certainty, Expert, Iteration, Objective, Rule, Status
 from walking_irl.versions import versions
 
 INTERRUPTED = "interrupted"
@@ -84,7 +84,7 @@ class Report:
         """Why the run ended, in one sentence."""
         if self.failure:
             return f"a forward solve failed: {self.failure}"
-        return INTERRUPTED if self.was_interrupted else self.ending.value
+        return INTERRUPTED if self.was_interrupted else self.summary.ending
 
     @property
     def ending(self) -> Status:
@@ -138,6 +138,8 @@ class Report:
             "contains_expert": self.contains_expert,
             "l1_error": self.l1_error,
             "relative_loss": self.relative_loss(self.recovered_mu),
+            "expert_gap": setup.expert_gap,
+            "n_samples": self.expert.n_samples,
             "regret": last.best_regret,
             "certificate": last.certificate,
             "forward_solves": sum(it.rule is not Rule.PROBE for it in self.iterations),
@@ -169,12 +171,26 @@ def _summary(r: Summary) -> dict[str, Any]:
     return {
         "rule": r.rule,
         "bracket": list(r.bracket),
+        "how_sure": r.how_sure,
+        "half_widths": None if r.certainty is None else _parts(r.certainty),
         "physical_intervals": r.physical_intervals.tolist(),
         "volume_ratio": r.volume_ratio,
         "condition_number": r.condition_number,
         "weakest": r.weakest,
         "gauge": r.gauge,
         "noise": r.noise.tolist(),
+    }
+
+
+def _parts(certainty: Certainty) -> dict[str, Any]:
+    """Half widths by cause; other levels of confidence scale the standard errors."""
+    return {
+        "from_noise": certainty.from_noise.tolist(),
+        "from_gap": certainty.from_gap.tolist(),
+        "from_solver": certainty.from_solver.tolist(),
+        "standard_errors": certainty.standard_errors.tolist(),
+        "gap": certainty.gap,
+        "gap_source": certainty.source.value,
     }
 
 

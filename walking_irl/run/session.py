@@ -26,9 +26,6 @@ from walking_irl.types import Iteration, Mode, Rule
 if TYPE_CHECKING:
     from walking_irl.run.film import Film
 
-PROBE = 1e-4
-"""Relative suboptimality whose extreme weights are probed at the end."""
-
 
 def run(
     setup: Setup,
@@ -143,10 +140,10 @@ def _timed(problem: Problem, watch: Stopwatch, executor: Executor | None) -> Ite
         centre=problem.setup.centre,
         mode=cast(Mode, problem.setup.mode),
         max_solves=problem.max_solves,
-        min_weight=problem.domain.defaults.min_weight,
+        min_weight=problem.min_weight,
         rng=np.random.default_rng(problem.setup.seed),
         measure=problem.learner.measure,
-        probe=Probing(PROBE, executor),
+        probe=Probing(executor=executor),
     )
     start = time.perf_counter()
     for it in steps:
