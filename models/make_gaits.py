@@ -45,10 +45,8 @@ ANGLES = {  # joint, curve of the norm, sign
 ARM_SWING, ELBOW = 15, 20  # [deg]
 TIES = {"hip_flexion": 1.0, "knee": 1.0, "ankle": 1.0, "other": 0.01, "step": 0.3}
 """How tightly joints are tied to the guess, and step length and period."""
-TIED = tuple(
-    stage(p, 60, 1e-5, tether=t)
-    for p, t in ((1e1, 30), (1e2, 30), (1e3, 10), (1e4, 10), (1e4, 3), (1e4, 1), (1e4, 0.3))
-)
+HELD = ((1e1, 30), (1e2, 30), (1e3, 10), (1e4, 10), (1e4, 3), (1e4, 1), (1e4, 0.3))
+"""Root penalties, and how tightly the joints are tied."""
 RELEASED = (stage(1e4, 60, 1e-5),)
 SEARCH = (stage(1e4, 60, 1e-6),)
 FINISH = (stage(1e5, 60, 1e-6), stage(1e6, 100, 1e-11))
@@ -136,7 +134,8 @@ class Maker:
     def walk(self, x: Array) -> Array:
         """A walk under the reference weights, from joint angles that are no walk."""
         w = self.spec.stack.reference_weights
-        tied = self.solver.solve(w, x, TIED, ties=ties(self.spec.walker))
+        shares = ties(self.spec.walker)
+        tied = self.solver.solve(w, x, [stage(p, 60, 1e-5, t * shares) for p, t in HELD])
         return self.solver.solve(w, tied.x, RELEASED).x
 
     def hop(self, w: Array, x: Array, hops: int, seed: int) -> Array:

@@ -130,7 +130,8 @@ def test_how_sure_a_recovery_is_is_read_back_and_told(recorded: Recording) -> No
     assert found["units"] == [f"m^{j}" for j in range(6)]
     assert found["rule"] == expected.rule and expected.rule in recorded.summary
     last = iterations[-1]
-    np.testing.assert_allclose(found["bracket"], [-last.certificate, last.best_regret])
+    np.testing.assert_allclose(found["bracket"], last.bracket)
+    assert found["how_sure"] == expected.how_sure and expected.how_sure in recorded.summary
     assert found["volume_ratio"] == pytest.approx(expected.volume_ratio)
     assert 0.0 < found["volume_ratio"] < 1.0
     assert f"leave {expected.volume_ratio:.1e} of the volume of all" in recorded.summary

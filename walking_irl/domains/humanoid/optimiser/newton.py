@@ -164,14 +164,12 @@ class Newton:
         *,
         known: float | None = None,
         root: Array | None = None,
-        ties: Array | None = None,
     ) -> None:
         self.structure, self.problem = structure, structure.problem
         self.w, self.stage, self.anchor, self.known, self.root = w, stage, anchor, known, root
-        if ties is None:
-            ties = np.ones(anchor.size)
-            ties[-2:] = anchor.size  # L and T concern all knots
-        self.tether = stage.tether * ties
+        self.tether = np.broadcast_to(stage.tether, anchor.size).copy()
+        if np.ndim(stage.tether) == 0:
+            self.tether[-2:] *= anchor.size  # L and T concern all knots
         self.damping = START_DAMPING
         self.last: Model | None = None
 
