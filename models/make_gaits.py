@@ -168,15 +168,20 @@ class Maker:
         return min([near[0], *found], key=lambda y: self.cost(w, y, penalty))
 
     def make(self, start: Array) -> dict[str, Array]:
-        """Arrays of the body's gaits, ready to be saved."""
+        """Gaits of the body by name, from a walk."""
         weights = weights_to_ship(self.spec)
         found = {"reference": self.hop(weights["reference"], start, HOPS["reference"], seed=0)}
         for k, (name, w) in enumerate(weights.items()):
             if name not in found:
                 x = self.exchange(w, found.values())
                 found[name] = self.hop(w, x, HOPS["other"], seed=k)
+        return found
+
+    def settle(self, gaits: Collection[Array]) -> dict[str, Array]:
+        """Arrays ready to be saved: each gait in the best basin that any of the others is in."""
+        weights, found = weights_to_ship(self.spec), {}
         for k, (name, w) in enumerate(weights.items()):
-            best = self.exchange(w, found.values())
+            best = self.exchange(w, [*gaits, *found.values()])
             found[name] = self.finish(w, best, np.random.default_rng([1, k]))
             self.report(name, w, found[name])
         prefix, problem = PREFIX.get(self.spec.body, ""), self.solver.problem
@@ -209,6 +214,12 @@ def weights_to_ship(spec: WalkerSpec) -> dict[str, Array]:
     return out
 
 
+def saved(path: Path, body: str) -> list[Array]:
+    """Gait vectors of a body in a file of gaits."""
+    with np.load(path) as data:
+        return list(data[f"{PREFIX[body]}x"])
+
+
 def main() -> None:
     """Make all gaits and save them."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -216,20 +227,26 @@ def main() -> None:
     parser.add_argument(
         "--body", type=Path, help="an MJCF file: make its gaits, from the shipped ones, beside it"
     )
+    parser.add_argument(
+        "--start", type=Path, nargs="*", help="files of gaits, of a like body: settle these instead"
+    )
     parser.add_argument("--workers", type=int, default=2, help="processes [%(default)s]")
     args = parser.parse_args()
     with ProcessPoolExecutor(args.workers, mp_context=get_context("spawn")) as pool:
         if args.body is None:
-            found = {}
+            found: dict[str, Array] = {}
             for spec in (HUMANOID, PLANAR):
                 maker = Maker(spec, pool)
-                found |= maker.make(maker.walk(guess(spec.walker)))
+                gaits = [x for path in args.start or () for x in saved(path, spec.body)]
+                gaits = gaits or list(maker.make(maker.walk(guess(spec.walker))).values())
+                found |= maker.settle(gaits)
             np.savez_compressed(args.out, **found)
         else:
             spec = WalkerSpec(str(args.body))
             start = next(iter(load_gaits(spec.body).values())).to_vector()
             maker = Maker(spec, pool)
-            np.savez_compressed(own_gaits(args.body), **maker.make(maker.walk(start)))
+            gaits = list(maker.make(maker.walk(start)).values())
+            np.savez_compressed(own_gaits(args.body), **maker.settle(gaits))
 
 
 if __name__ == "__main__":
