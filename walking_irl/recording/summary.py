@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -100,11 +101,16 @@ def _legend(experiment: Experiment, world: str) -> str:
         (
             f"* **Points**: {', '.join(experiment.others)}, coloured as their curves are"
             if experiment.others
-            else "* **Blue** query, **green** estimate"
+            else "* **Blue dot** query, **green diamond** estimate"
         )
-        + (", **red** ground truth." if experiment.w_expert is not None else "."),
+        + (", **red cross** ground truth." if experiment.w_expert is not None else "."),
+        "* **Intervals**: what a weight may be, given everything that was seen. They are no "
+        "confidence intervals about an estimate. Right of them the same, magnified.",
         "* **Certificate**: no matter which weights are true, a mixture of the policies found "
-        "loses at most this much.",
+        "loses at most this much. It and the best *regret* bound the same loss from both sides, in "
+        "the unit of the weighed objectives. What is below 1e-7 leaves the plot.",
+        "* At the end **probes** ask for the extreme weights of each interval, so that the query "
+        "jumps; the loss is drawn of the queries before. The last frames show the answer.",
     ]
     return "\n".join(text for text in lines if text)
 
@@ -140,3 +146,14 @@ def properties(experiment: Experiment, found: Summary | None, ending: str | None
             "gauge": found.gauge,
         }
     return {key: value for key, value in known.items() if value is not None}
+
+
+def motion_properties(name: str, weights: Mapping[str, float]) -> dict[str, Any]:
+    """Values of the property ``experiment`` of a recording that shows one motion alone."""
+    values = {
+        "domain": name,
+        "objectives": list(weights),
+        "w": list(weights.values()),
+        "versions": [f"{package} {number}" for package, number in versions().items()],
+    }
+    return {key: value for key, value in values.items() if value}
