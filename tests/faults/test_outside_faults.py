@@ -102,8 +102,9 @@ def test_a_script_without_a_guard_is_told_in_one_sentence(tmp_path):
 
 
 def test_an_empty_argument_is_told(complaint):
-    assert "empty" in complaint("recover", "--domain", "lqr", "--record", "")
-    assert "empty" in complaint("recover", "--domain", "lqr", "--json=")
+    assert "--record is empty" in complaint("recover", "--domain", "lqr", "--record", "")
+    assert "--json is empty" in complaint("recover", "--domain", "lqr", "--json=")
+    assert "an argument is empty" in complaint("inspect", "")
 
 
 @pytest.mark.slow

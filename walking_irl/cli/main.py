@@ -16,6 +16,7 @@ import sys
 from collections.abc import Sequence
 from concurrent.futures import BrokenExecutor
 from importlib import import_module
+from itertools import pairwise
 from typing import IO, NoReturn, cast
 
 from walking_irl import __version__
@@ -85,8 +86,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(argv: Sequence[str]) -> int:
-    if any(not word or (word[:2] == "--" and word.endswith("=")) for word in argv):
-        raise InvalidInputError("an argument is empty; is a variable of the shell not set?")
+    for before, word in pairwise(["", *argv]):
+        if not word or (word[:2] == "--" and word.endswith("=")):
+            what = word.rstrip("=") or (before if before[:2] == "--" else "an argument")
+            raise InvalidInputError(f"{what} is empty; is a variable of the shell not set?")
     args = build_parser().parse_args(argv)
     from rich.console import Console
 
