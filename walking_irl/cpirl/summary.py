@@ -110,6 +110,11 @@ def summarise(
     )
 
 
+def estimate_name(found: Summary) -> str:
+    """What the weights of a run are to be called: recovered, where it ended with some."""
+    return "recovered" if found.status.has_weights else "best so far"
+
+
 def per_unit(interval: Sequence[float], unit: str) -> str:
     """An interval of a weight per raw unit of its cost, in words.
 
