@@ -140,4 +140,7 @@ def properties(experiment: Experiment, found: Summary | None, ending: str | None
             "weakest": found.weakest,
             "gauge": found.gauge,
         }
+    if found is not None and found.certainty is not None:
+        for part in ("from_noise", "from_gap", "from_solver"):
+            known[part] = getattr(found.certainty, part)
     return {key: value for key, value in known.items() if value is not None}
