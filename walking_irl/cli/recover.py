@@ -10,7 +10,7 @@ from typing import Any
 
 from rich.console import Console
 
-from walking_irl.cli import DONE, FAILED, INTERRUPTED, by_method
+from walking_irl.cli import DONE, FAILED, INTERRUPTED, by_method, walk
 from walking_irl.cli.terminal import Terminal, show_report
 from walking_irl.cli.weights import parse_weights
 from walking_irl.domains import DOMAINS, load
@@ -80,6 +80,7 @@ def add_parser(commands: Any) -> argparse.ArgumentParser:
         "--resume", type=Path, metavar="FILE.npz", help="go on from a checkpoint, as it began"
     )
     by_method.add_arguments(p)
+    walk.add_arguments(p)
     _add_outputs(p.add_argument_group("output"))
     return p
 
@@ -133,6 +134,9 @@ def known_options() -> dict[str, Option]:
 
 def run(args: argparse.Namespace, console: Console) -> int:
     """``walking-irl recover``."""
+    if args.walk is not None:
+        return walk.run(args, _asked(args), console)
+    walk.refuse_alone(args)
     if args.method is not None:
         return by_method.run(args, _asked(args), console)
     by_method.refuse_alone(args)

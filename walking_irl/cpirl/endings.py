@@ -45,10 +45,13 @@ class Endings(NamedTuple):
     dead_end: tuple[EndRule, ...]
 
 
-def endings_of(levels: Levels, is_exact: bool, tol: float) -> Endings:
+def endings_of(levels: Levels, is_exact: bool, tol: float, bracket: float | None = None) -> Endings:
     """The rules for a mode and a kind of expert; ``tol`` is the regret that counts as none."""
+    least: tuple[EndRule, ...] = (Dominated(tol), GapCloses(tol))
+    if bracket is not None:
+        least = (BracketNarrow(bracket),)
     return Endings(
-        regret=(Matched(tol),) if levels.has_known_minimum else (Dominated(tol), GapCloses(tol)),
+        regret=(Matched(tol),) if levels.has_known_minimum else least,
         newton=(
             (gains_nothing, StepsEnd(_EXACT_STEP), MatchIsBest(_EXACT_STEP))
             if is_exact
@@ -129,6 +132,21 @@ class GapCloses:
         if bundle.least_robust_regret + bundle.bounded_game.value > self.tol * unit:
             return None
         return Ending(Status.MIXTURE_DOMINATES if has_mixture else Status.GAP_CLOSED)
+
+
+@dataclass(frozen=True)
+class BracketNarrow:
+    """The best regret and its lower bound are near, whatever dominates the expert."""
+
+    width: float
+    """Relative to |w.mu_E| of the best query."""
+
+    def __call__(self, outlook: Outlook) -> Ending | None:
+        """See :class:`Endings`."""
+        bundle = outlook.bundle
+        w = bundle.W[int(np.argmin(bundle.robust_regrets(bundle.W)))]
+        left = bundle.least_robust_regret + bundle.bounded_game.value
+        return Ending(Status.GAP_CLOSED, w) if left <= self.width * bundle.scale(w) else None
 
 
 # On Newton's progress.
