@@ -128,6 +128,7 @@ def test_terminal_says_how_sure_the_weights_are(call):
     code, out, _ = call("recover", "--domain", "lqr", "--no-record")
     assert code == 0
     for part in ("certificate", "suboptimality of the expert: at most", "weights: the ",
+                 "half widths: from the expert's possible",
                  "of the volume of all is left", "least certain: axis",
                  "features of the expert: known exactly", "L1 error"):  # fmt: skip
         assert part in out, part
