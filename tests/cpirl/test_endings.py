@@ -12,7 +12,7 @@ from walking_irl.cpirl.loop import cpirl
 from walking_irl.cpirl.outlook import DeadEnd, Outlook, Progress
 from walking_irl.cpirl.stops import CertificateBelow, EstimateSettled, IntervalsNarrowerThan
 from walking_irl.domains.lqr import LQR
-from walking_irl.errors import EmptyPolyhedronError, FlatPolyhedronError
+from walking_irl.errors import EmptyPolyhedronError, FlatPolyhedronError, InvalidInputError
 from walking_irl.geometry.polyhedron import WeightPolyhedron
 from walking_irl.types import Expert, Iteration, Response, Rule, Status
 
@@ -91,6 +91,40 @@ def test_gap_between_the_best_regret_and_the_mixtures_value_closes():
     assert status(rule, gap) is Status.MIXTURE_DOMINATES
     assert status(rule, outlook((2.0, 0.5), mode="minimise")) is None
     assert status(rule, outlook((1.5, 0.5), (0.5, 1.5), mode="minimise")) is Status.GAP_CLOSED
+
+
+@pytest.fixture
+def dominated():
+    """Policies between effort and time, and an expert that is worse than one of them in both."""
+    pace = np.linspace(0.0, 1.0, 101)
+    costs = np.c_[pace**2, (1.0 - pace) ** 2] + 0.2
+
+    def forward(w):
+        best = int(np.argmin(costs @ w))
+        return Response(best, mu=-costs[best])
+
+    return forward, costs, Expert(-(costs[70] + [0.05, 0.02]), np.zeros(2))
+
+
+@pytest.mark.parametrize("bracket", [0.02, 0.001])
+def test_a_bracket_is_closed_although_a_policy_dominates(dominated, bracket):
+    forward, costs, expert = dominated
+    run = {"mode": "minimise", "rng": np.random.default_rng(0)}
+    assert list(cpirl(forward, expert, **run))[-1].status is Status.DOMINATED
+    found = list(cpirl(forward, expert, bracket=bracket, **run))[-1]
+    assert found.status is Status.NOT_OPTIMAL and found.status.is_success
+    W = np.c_[np.linspace(0, 1, 2001), 1 - np.linspace(0, 1, 2001)]
+    least = float((W @ -expert.mu - (W @ costs.T).min(axis=1)).min())
+    w = found.estimate
+    regret = float(w @ -expert.mu - (costs @ w).min())
+    assert least - 1e-9 <= regret <= least + bracket * float(w @ -expert.mu)
+
+
+@pytest.mark.parametrize(("mode", "bracket"), [("optimal", 0.01), ("minimise", 0.0)])
+def test_a_bracket_is_asked_for_where_there_is_one(dominated, mode, bracket):
+    forward, _, expert = dominated
+    with pytest.raises(InvalidInputError, match="bracket"):
+        next(cpirl(forward, expert, mode=mode, bracket=bracket, rng=np.random.default_rng(0)))
 
 
 def test_newton_ends_where_its_step_does_nothing_or_leads_to_the_demonstration():

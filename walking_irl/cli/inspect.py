@@ -34,7 +34,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
         console.print(_table_of_recording(content))
     for key in (
         *("domain", "seed", "centre", "mode", "status", "ending", "rule", "certificate"),
-        *("bracket", "volume_ratio", "condition_number", "weakest", "gauge", "noise"),
+        *("bracket", "how_sure", "volume_ratio", "condition_number", "weakest", "gauge", "noise"),
     ):
         if content[key] is not None:
             console.print(f"{key.replace('_', ' ')}: {escape(_short(content[key]))}")

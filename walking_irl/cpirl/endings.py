@@ -30,6 +30,8 @@ _EXACT_STEP, _ESTIMATED_STEP = 2e-4, 1e-3
 """Newton step (L1) that counts as none."""
 _BEATEN = -1e-8
 """Certificate, relative to the expert's features, that proves that a mixture beats it."""
+_NEARLY = 1e-3
+"""Least relative regret of an expert whose weights are sought although a policy dominates it."""
 _CLOSED = 3.0
 """Ratio of the ends of min f's bracket, the lower above 0, below which there is little to learn:
 half widths, which follow its root, would become narrower by sqrt(3) at most."""
@@ -43,10 +45,13 @@ class Endings(NamedTuple):
     dead_end: tuple[EndRule, ...]
 
 
-def endings_of(levels: Levels, is_exact: bool, tol: float) -> Endings:
+def endings_of(levels: Levels, is_exact: bool, tol: float, bracket: float | None = None) -> Endings:
     """The rules for a mode and a kind of expert; ``tol`` is the regret that counts as none."""
+    least: tuple[EndRule, ...] = (Dominated(tol), GapCloses(tol))
+    if bracket is not None:
+        least = (BracketNarrow(bracket),)
     return Endings(
-        regret=(Matched(tol),) if levels.has_known_minimum else (Dominated(tol), GapCloses(tol)),
+        regret=(Matched(tol),) if levels.has_known_minimum else least,
         newton=(
             (gains_nothing, StepsEnd(_EXACT_STEP), MatchIsBest(_EXACT_STEP))
             if is_exact
@@ -90,14 +95,21 @@ class Matched:
 
 @dataclass(frozen=True)
 class Dominated:
-    """One policy that was queried is at least as good in every feature, and better in one."""
+    """One policy that was queried is at least as good in every feature, and better in one.
+
+    Near the minimum of the regret of a nearly optimal expert that is no answer: there the best
+    policy dominates it by as little as it is sub-optimal, and its weights are sought further.
+    """
 
     tol: float
 
     def __call__(self, outlook: Outlook) -> Ending | None:
         """See :class:`Endings`; of the policies only evaluated none is kept."""
-        d = outlook.bundle.differences[: len(outlook.bundle.responses)]
-        is_above = (d >= 0.0).all(axis=1) & (d.max(axis=1) > self.tol * outlook.bundle.unit)
+        bundle = outlook.bundle
+        if outlook.model is not None and bundle.relative_regrets.min() <= _NEARLY:
+            return None
+        d = bundle.differences[: len(bundle.responses)]
+        is_above = (d >= 0.0).all(axis=1) & (d.max(axis=1) > self.tol * bundle.unit)
         return Ending(Status.DOMINATED) if is_above.any() else None
 
 
@@ -120,6 +132,21 @@ class GapCloses:
         if bundle.least_robust_regret + bundle.bounded_game.value > self.tol * unit:
             return None
         return Ending(Status.MIXTURE_DOMINATES if has_mixture else Status.GAP_CLOSED)
+
+
+@dataclass(frozen=True)
+class BracketNarrow:
+    """The best regret and its lower bound are near, whatever dominates the expert."""
+
+    width: float
+    """Relative to |w.mu_E| of the best query."""
+
+    def __call__(self, outlook: Outlook) -> Ending | None:
+        """See :class:`Endings`."""
+        bundle = outlook.bundle
+        w = bundle.W[int(np.argmin(bundle.robust_regrets(bundle.W)))]
+        left = bundle.least_robust_regret + bundle.bounded_game.value
+        return Ending(Status.GAP_CLOSED, w) if left <= self.width * bundle.scale(w) else None
 
 
 # On Newton's progress.
@@ -220,8 +247,8 @@ def told_true(decision: Decision, outlook: Outlook, tol: float) -> Decision:
     """The ending in the light of what is known of min f; a run that goes on is not asked.
 
     Where the bracket has closed nothing is left to ask, whatever ended the run. Modes that take
-    min f to be 0 are contradicted by an exact expert whose lower bound is above what it is granted;
-    one above the tolerance says that the expert is not exactly optimal.
+    min f to be 0 are contradicted by an exact expert whose lower bound is above what it is granted.
+    Otherwise one above the tolerance says that the expert is not exactly optimal.
 
     Args:
         decision: What is believed.
@@ -235,7 +262,6 @@ def told_true(decision: Decision, outlook: Outlook, tol: float) -> Decision:
     bracket = bracket_of(bundle, decision.estimate)
     if takes_zero and bundle.is_exact and bracket.lower > max(bundle.expert.suboptimality, none):
         return decision._replace(status=Status.CONTRADICTED)
-    is_done = takes_zero if status.has_weights else bracket.is_closed(_CLOSED)
-    if is_done and bracket.lower > none:
+    if bracket.lower > none and (status.has_weights or bracket.is_closed(_CLOSED)):
         return decision._replace(status=Status.NOT_OPTIMAL)
     return decision

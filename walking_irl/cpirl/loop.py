@@ -50,6 +50,7 @@ def cpirl(
     centre: str | OwnCentre = "ac",
     mode: Mode = "optimal",
     tol: float = 1e-6,
+    bracket: float | None = None,
     max_solves: int = 60,
     min_weight: float = 0.0,
     rng: np.random.Generator,
@@ -68,6 +69,8 @@ def cpirl(
         mode: "optimal" keeps weights with f <= 0; "set" those with f <= tol |w.mu_E|; "minimise"
             lowers f as far as it goes, for an expert that need not be optimal.
         tol: Regret that counts as none, relative to |w.mu_E|.
+        bracket: In "minimise" mode, go on until the least regret is known within this, relative,
+            even where a policy is better than the expert in every feature; None ends there.
         max_solves: Budget of forward solves, before probes.
         min_weight: Lower bound of every weight.
         rng: Used by sampling centres, and to move a centre that repeats itself.
@@ -86,6 +89,8 @@ def cpirl(
             features.
     """
     probing = Probing(probe) if isinstance(probe, int | float) else probe
+    if bracket is not None and (mode != "minimise" or not bracket > 0.0):
+        raise InvalidInputError("a bracket is a positive number, for the minimise mode only")
     asked = None if probing is None else probing.level
     if not tol > 0.0 or max_solves < 1 or (asked is not None and not asked > 0.0):
         raise InvalidInputError("tol, max_solves and probe must be positive")
@@ -96,7 +101,7 @@ def cpirl(
         levels,
         Centres(centre_rule(centre), rng),
         ExactNewton(levels) if bundle.is_exact else EstimatedNewton(levels, measure),
-        endings_of(levels, bundle.is_exact, tol),
+        endings_of(levels, bundle.is_exact, tol, bracket),
     )
     rules = (BudgetSpent(max_solves), *stop)
     history: list[Iteration] = []

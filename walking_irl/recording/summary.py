@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from walking_irl.cpirl.summary import Summary, noise_level, per_unit, volume_left
+from walking_irl.cpirl.summary import Summary, estimate_name, noise_level, per_unit, volume_left
 from walking_irl.recording.experiment import Experiment
 from walking_irl.recording.panels import panels
 from walking_irl.types import Status
@@ -48,13 +48,14 @@ def _result(experiment: Experiment, found: Summary) -> str:
         return f"{text} No weights make this expert optimal; {nearest}."
     if experiment.w_expert is not None:
         l1 = float(np.abs(found.w - experiment.w_expert).sum())
-        text += f" Ground-truth weights recovered to {l1:.4f} (sum of absolute errors)."
+        found_how = "recovered to" if found.status.has_weights else "missed by"
+        text += f" Ground-truth weights {found_how} {l1:.4f} (sum of absolute errors)."
     return text
 
 
 def _table(experiment: Experiment, found: Summary) -> str:
     w_expert = experiment.w_expert
-    head = ["objective", "ground truth", "recovered", "interval"]
+    head = ["objective", "ground truth", estimate_name(found), "interval"]
     is_scaled = any(o.scale != 1.0 for o in experiment.objectives)
     if is_scaled:
         head.append("per raw unit")
@@ -145,6 +146,9 @@ def properties(experiment: Experiment, found: Summary | None, ending: str | None
             "weakest": found.weakest,
             "gauge": found.gauge,
         }
+    if found is not None and found.certainty is not None:
+        for part in ("from_noise", "from_gap", "from_solver"):
+            known[part] = getattr(found.certainty, part)
     return {key: value for key, value in known.items() if value is not None}
 
 

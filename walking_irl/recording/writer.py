@@ -21,6 +21,7 @@ from walking_irl.recording.style import PLAYBACK_RATE
 from walking_irl.recording.summary import motion_properties, properties, summary
 from walking_irl.recording.views.view import WorldView
 from walking_irl.types import Iteration
+from walking_irl.workers import interrupts_held
 
 FLUSH_SECONDS = 60.0
 FRAMES_WITHOUT_WORLD = round(1.5 * PLAYBACK_RATE)
@@ -120,7 +121,8 @@ class Recorder(Generic[Motion]):
     ) -> None:
         ending = None if kind is None else _ending(kind)
         try:
-            self._save(ending)
+            with interrupts_held():  # a second Ctrl-C, or one at the very end
+                self._save(ending)
         except RecordingError as failure:
             if error is None:
                 raise

@@ -65,6 +65,13 @@ def test_a_model_walk_comes_back_within_the_cut_of_the_harmonics(read, walk):
     assert person.convention == "opensim" and person.unit == "degrees" and not person.missing
 
 
+def test_the_hips_are_as_high_as_the_model_s_own(read, walk):
+    """Root's z counts from upright standing; soles of the model sink by about a centimetre."""
+    z = WALKER.joints.index("root_z")
+    apart = read(storage(walk)).gait.q[:, z] - GAIT.q[:, z]
+    assert np.abs(apart).max() < SINK  # m
+
+
 def test_noise_of_two_degrees_is_averaged(read):
     """Three whole cycles: noise of 2 degrees falls below 2 / sqrt(3 cycles x 2 sides) + the cut."""
     noisy = recording(GAIT, WALKER, cycles=4, noise=2.0, rng=np.random.default_rng(1))

@@ -167,8 +167,9 @@ class Newton:
     ) -> None:
         self.structure, self.problem = structure, structure.problem
         self.w, self.stage, self.anchor, self.known, self.root = w, stage, anchor, known, root
-        self.tether = np.full(anchor.size, stage.tether)
-        self.tether[-2:] *= anchor.size  # L and T concern all knots
+        self.tether = np.broadcast_to(stage.tether, anchor.size).copy()
+        if np.ndim(stage.tether) == 0:
+            self.tether[-2:] *= anchor.size  # L and T concern all knots
         self.damping = START_DAMPING
         self.last: Model | None = None
 

@@ -101,6 +101,7 @@ class GaitSolver:
         *,
         known: float | None = None,
         root: Array | None = None,
+        anchor: Array | None = None,
         on_step: OnStep | None = None,
     ) -> Solution:
         """Best gait for weights ``w`` near the gait ``x``.
@@ -113,13 +114,15 @@ class GaitSolver:
                 an optimum.
             root: Multipliers of the root forces at the start (:meth:`dual` of an optimal gait of
                 other weights); None: unknown, the first step is Gauss-Newton's.
+            anchor: Gait that tethers lead to, shape (N nv + 2,); None: the start.
             on_step: Told of every iteration.
 
         Raises:
             SolverError: If the cost of the start is not finite.
         """
         passed: list[Array] = []
-        anchor, iterations, status, model = x, 0, Status.CAPPED, None
+        anchor = x if anchor is None else anchor
+        iterations, status, model = 0, Status.CAPPED, None
         for s in stages:
             newton = Newton(self.structure, w, s, anchor, known=known, root=root)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from walking_irl.arrays import Array
 from walking_irl.domains.humanoid.optimiser.transcription import ROOT_PENALTY
 
 
@@ -14,11 +15,12 @@ class Stage(NamedTuple):
     max_iter: int
     tol: float
     """Relative Newton decrement at which a gait counts as a minimum."""
-    tether: float = 0.0
-    """Weight of the squared distance from the start of the solve, per unknown."""
+    tether: float | Array = 0.0
+    """Weight of the squared distance from the anchor, the start of the solve by default: one for
+    all knots' unknowns, or one each, step length and half period included, shape (N nv + 2,)."""
 
 
-def stage(raw_penalty: float, max_iter: int, tol: float, tether: float = 0.0) -> Stage:
+def stage(raw_penalty: float, max_iter: int, tol: float, tether: float | Array = 0.0) -> Stage:
     """Stage with its penalty stated relative to the full one (1e6)."""
     return Stage(ROOT_PENALTY * raw_penalty / 1e6, max_iter, tol, tether)
 

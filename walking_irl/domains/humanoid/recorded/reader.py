@@ -23,7 +23,7 @@ from walking_irl.domains.humanoid.recorded.cycle import (
     phases,
     symmetric_fit,
 )
-from walking_irl.domains.humanoid.recorded.feet import Feet, feet_of
+from walking_irl.domains.humanoid.recorded.feet import Feet, feet_of, hips_height
 from walking_irl.domains.humanoid.recorded.forces import is_force_table, mean_force
 from walking_irl.domains.humanoid.recorded.naming import Channels, channels
 from walking_irl.domains.humanoid.recorded.person import Options, Person, averaged
@@ -64,6 +64,14 @@ def read_person(paths: Sequence[Path], walker: Walker, options: Options | None =
     Raises:
         InvalidInputError: If a file is no recording of a walk; the message names it and says why.
     """
+    trials = read_trials(paths, walker, options)
+    return trials[0] if len(trials) == 1 else averaged(trials)
+
+
+def read_trials(
+    paths: Sequence[Path], walker: Walker, options: Options | None = None
+) -> list[Person]:
+    """The same, each trial by itself."""
     options = options or Options()
     tables = [read_table(path) for path in paths]
     plates = [t for t in tables if is_force_table(t)]
@@ -75,11 +83,10 @@ def read_person(paths: Sequence[Path], walker: Walker, options: Options | None =
             else "no recording of joint angles is given"
         )
     owner = [max(angles, key=lambda a, p=p: _alike(a.path, p.path)) for p in plates]  # type: ignore[misc]
-    trials = [
+    return [
         person_of(a, walker, options, [p for p, o in zip(plates, owner, strict=True) if o is a])
         for a in angles
     ]
-    return trials[0] if len(trials) == 1 else averaged(trials)
 
 
 def _alike(a: Path, b: Path) -> int:
@@ -148,7 +155,7 @@ def _person(
     q = fit.at(knots)
     q[:, 0] -= q[0, 0]
     pelvis, trunk = _neutral(q, walker) if c.convention != "own" else (0.0, 0.0)
-    q[:, 2] = _on_the_floor(q[:, 2], feet_of(walker, q))
+    q[:, 2] = _on_the_floor(q[:, 2], feet_of(walker, q)) - hips_height(walker)
     slow = float(np.sqrt(s.scale))
     deviations, lengths, periods = _cycles(s, fit, timing, start, walker)
     notes = list(s.motion.notes)
@@ -216,7 +223,7 @@ def _neutral(q: Array, walker: Walker) -> tuple[float, float]:
 
 
 def _on_the_floor(heights: Array, feet: Feet) -> Array:
-    """Heights of the root above upright standing, so that the lowest soles sink a little."""
+    """Heights of the hips above the floor, so that the lowest soles sink a little [m]."""
     lowest = heights - feet.below
     return np.asarray(heights - np.percentile(lowest, FLOOR) - SINKS)
 

@@ -1,0 +1,92 @@
+"""``recover --walk``: what it refuses, and a person's answer from file to table."""
+
+import json
+
+import numpy as np
+import pytest
+from person_files import recording, storage
+
+from walking_irl.cli import walk as command
+from walking_irl.cli.main import main
+from walking_irl.domains.humanoid.body.load import load_walker
+from walking_irl.domains.humanoid.costs.defaults import REFERENCE_WEIGHTS
+from walking_irl.domains.humanoid.gait.library import load_gaits
+from walking_irl.domains.humanoid.recorded.feasible import Feasible
+from walking_irl.run import walk as module
+
+WALKER = load_walker()
+GAIT = load_gaits()["reference"]
+
+
+@pytest.fixture
+def walked(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "w.mot").write_text(storage(recording(GAIT, WALKER)))
+    return "w.mot"
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [
+        (("--seed", 3), "--seed"),
+        (("--mode", "minimise"), "--mode"),
+        (("--weights", "1,1,1,1,1,1"), "--weights"),
+        (("--rollouts", 5), "--rollouts"),
+        (("--method", "maxent"), "--method"),
+        (("--resume", "a.npz"), "--resume"),
+        (("--json", "no/where.json"), "where"),
+    ],
+)
+def test_options_without_effect_are_named(walked, capsys, options, word):
+    assert main(["recover", "--walk", walked, *map(str, options)]) == 2
+    out, err = capsys.readouterr()
+    assert not out and word in err and err.count("\n") == 1
+
+
+def test_a_habit_is_accepted_of_a_person_only(walked, capsys):
+    assert main(["recover", "--accept-habit"]) == 2
+    assert "--walk" in capsys.readouterr().err
+
+
+def test_what_is_no_recording_is_refused_before_anything_is_solved(walked, capsys, tmp_path):
+    (tmp_path / "empty.mot").write_text("")
+    assert main(["recover", "--walk", walked, "--walk", "empty.mot"]) == 2
+    out, err = capsys.readouterr()
+    assert "empty.mot" in err and not out
+
+
+def test_no_weights_are_told_of_what_is_no_habit_of_this_body(walked, monkeypatch, capsys):
+    """The nearest gait is as far off as that of a person who crouches."""
+    apart = {"hip_flexion": 14.0, "knee": 25.0, "ankle": 9.0, "elbow": 3.0}
+    far = Feasible(GAIT, np.ones(6), 0.1, 1e-6, apart, "up", 1)
+    monkeypatch.setattr(module, "nearest", lambda *args: far)
+    assert main(["recover", "--walk", walked, "--no-record"]) == 2
+    out, err = capsys.readouterr()
+    assert "weights:" not in out and err.count("\n") == 1
+    assert "not a habit of the body" in err and "--accept-habit" in err and "knee 25" in err
+
+
+@pytest.mark.slow
+def test_a_person_s_answer_comes_in_its_order(walked, monkeypatch, capsys, tmp_path):
+    """One start and one turn; the model's own walk is nearly optimal for its own weights."""
+    monkeypatch.setattr(module, "starting_weights", lambda reference: reference[None])
+    monkeypatch.setattr(module, "ROUNDS", 1)
+    argv = ["recover", "--walk", walked, "--walk", walked, "--json", "out.json", "--no-record"]
+    again = command._explain
+    known = []
+
+    def once(*args):  # the second person is the first
+        known.append(known[0] if known else again(*args))
+        return known[-1]
+
+    monkeypatch.setattr(command, "_explain", once)
+    assert main(argv) == 0
+    out = capsys.readouterr().out
+    places = [out.index(f"\n{k}. ") for k in range(1, 6)]
+    assert places == sorted(places) and "w.mot against w.mot" in out
+    person = json.loads((tmp_path / "out.json").read_text())["people"][0]
+    low, high = person["suboptimality"]
+    assert 0 <= low <= high < 0.02 and person["nearest"]["sagittal"] < 2.0
+    w, half = np.array(person["w"]), np.array(person["half_widths"])
+    assert w.sum() == pytest.approx(1) and (half >= module.NARROWEST).all()
+    assert np.all(np.abs(w - REFERENCE_WEIGHTS) <= half)

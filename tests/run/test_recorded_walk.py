@@ -1,0 +1,129 @@
+"""What a recorded walk was weighed for: walkers of known weights, in the plane to be quick."""
+
+import numpy as np
+import pytest
+
+from walking_irl.domains.humanoid.costs.defaults import REFERENCE_WEIGHTS
+from walking_irl.domains.humanoid.gait.gait import Gait
+from walking_irl.domains.humanoid.learner import search
+from walking_irl.domains.humanoid.recorded.closeness import degrees_apart
+from walking_irl.domains.humanoid.spec import PLANAR
+from walking_irl.run import walk as module
+from walking_irl.run.remembered import Remembered
+from walking_irl.run.walk import (
+    BRACKET,
+    MAX_SOLVES,
+    NARROWEST,
+    Walk,
+    alternate,
+    explain,
+    nearest,
+    starting_weights,
+)
+from walking_irl.run.walk_report import explanation_json, force_apart
+
+TRUTH = REFERENCE_WEIGHTS * [1.6, 0.8, 1.5, 0.7, 1.4, 0.8]
+TRUTH = TRUTH / TRUTH.sum()
+
+
+def noisy(gait, degrees, seed):
+    """Joint angles off by slow errors, each joint's own; the root is where it was."""
+    rng = np.random.default_rng(seed)
+    phase = np.pi * np.arange(gait.n_knots) / gait.n_knots
+    waves = np.column_stack([f(k * phase) for k in range(1, 5) for f in (np.cos, np.sin)])
+    error = waves @ rng.normal(size=(8, gait.q.shape[1]))
+    error *= np.deg2rad(degrees) / error.std(axis=0)
+    error[:, : PLANAR.walker.n_root] = 0
+    return Gait(gait.q + error, gait.step_length, gait.half_period)
+
+
+@pytest.fixture(scope="module")
+def truth():
+    return search(PLANAR, TRUTH).policy
+
+
+@pytest.fixture(scope="module")
+def walk(truth):
+    return Walk(noisy(truth, 1.5, 0))
+
+
+@pytest.fixture(scope="module")
+def near(walk):
+    return nearest(PLANAR, walk)
+
+
+@pytest.fixture(scope="module")
+def turns(walk, near):
+    return alternate(PLANAR, walk, REFERENCE_WEIGHTS, [near.gait], 3)
+
+
+@pytest.mark.slow
+def test_a_walker_of_known_weights_is_explained_better_than_by_the_start(turns):
+    start, first, end = (
+        np.abs(w - TRUTH).sum() for w in (REFERENCE_WEIGHTS, turns[0].w, turns[-1].w)
+    )
+    assert max(first, end) < 0.6 * start
+    assert np.all(np.abs(turns[-1].w - TRUTH) <= turns[-1].allowed())
+
+
+@pytest.mark.slow
+def test_the_gap_falls_from_turn_to_turn_and_every_bracket_is_narrow(turns):
+    gaps = [t.gap for t in turns]
+    assert gaps == sorted(gaps, reverse=True) and gaps[-1] > 0
+    for t in turns:
+        low, high = t.bracket
+        assert 0 <= low <= high <= low + BRACKET + 1e-9
+        assert t.solves <= MAX_SOLVES
+        # a noisy gait of an optimal walker: it is nearly optimal for some weights
+        assert high < 0.01
+
+
+@pytest.mark.slow
+def test_the_best_gait_is_nearer_to_the_walker_than_its_noise(turns, truth):
+    apart = degrees_apart(PLANAR.walker, turns[-1].best, truth)
+    assert max(apart[n] for n in ("hip_flexion", "knee", "ankle")) < 1.5
+
+
+@pytest.mark.slow
+def test_half_widths_hold_the_parts_that_they_name_and_are_never_too_narrow(
+    walk, near, monkeypatch
+):
+    """One turn from each start; a second trial is the same walk with other noise."""
+    monkeypatch.setattr(
+        module, "starting_weights", lambda reference: starting_weights(reference)[:2]
+    )
+    found = explain(PLANAR, walk, near, trials=[walk], rounds=1)
+    assert len(found.others) == 1
+    assert np.allclose(found.starts, np.abs(found.others[0].w - found.w))
+    parts = np.sqrt(found.allowed**2 + found.starts**2 + found.trials**2)
+    assert np.allclose(found.half, np.maximum(parts, NARROWEST))
+    assert np.all(np.abs(found.w - TRUTH) <= found.half)
+    assert found.last.gap <= found.others[0].gap
+    content = explanation_json(found, walk.shown)
+    assert content["w"] == found.w.tolist() and len(content["intervals"]) == 6
+
+
+def test_starting_weights_are_far_apart():
+    w = starting_weights(REFERENCE_WEIGHTS)
+    assert np.allclose(w.sum(axis=1), 1) and (w > 0).all()
+    apart = np.abs(w[:, None] - w).sum(axis=2)[np.triu_indices(3, 1)]
+    assert apart.min() > 0.3  # L1
+
+
+def test_weights_asked_twice_are_solved_once_and_every_answer_is_kept(truth):
+    forward = Remembered(truth, PLANAR)
+    first = forward(TRUTH)
+    other = forward(REFERENCE_WEIGHTS)
+    again = forward(TRUTH)
+    assert forward.solves == 2
+    np.testing.assert_array_equal(again.mu, first.mu)
+    assert (again.evaluated == other.mu).all(axis=1).any()
+    assert (forward.policies() @ TRUTH).max() <= first.mu @ TRUTH + 1e-6  # the best is its own
+
+
+def test_forces_of_a_gait_are_not_apart_from_its_own(truth):
+    from walking_irl.domains.humanoid.gait.realism import gait_cycle
+
+    force = np.roll(gait_cycle(PLANAR.walker, truth).force[:, 0], 17)
+    assert force_apart(PLANAR.walker, truth, force) < 1e-12
+    assert force_apart(PLANAR.walker, truth, 0.9 * force) > 0.05  # body weights
