@@ -67,7 +67,7 @@ def run(K: int, n: int = 4, seed: int = 0) -> tuple[Experiment, list[Iteration]]
             Iteration(
                 k, polyhedron, w, Rule.CENTRE, Response(None, mu), regret, best[0], best[0] / 2,
                 after.intervals(), best[1], Status.CUT if k < n - 1 else Status.BUDGET,
-                Bracket(-best[0] / 2, best[0]),
+                bracket=Bracket(-best[0] / 2, best[0]),
             )
         )  # fmt: skip
         polyhedron = after

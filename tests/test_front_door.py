@@ -61,11 +61,8 @@ def test_one_call_is_the_iterator_run_to_its_end(capsys):
     rng = np.random.default_rng(0)
     expert = domain.expert(np.array([0.2, 0.5, 0.3]), rng)
     recovery = wi.recover(domain.forward, expert, objectives=domain.objectives)
-    run = list(
-        wi.cpirl.cpirl(
-            domain.forward, expert, rng=np.random.default_rng(0), probe=wi.cpirl.Probing()
-        )
-    )
+    rng, probing = np.random.default_rng(0), wi.cpirl.Probing()
+    run = list(wi.cpirl.cpirl(domain.forward, expert, rng=rng, probe=probing))
     np.testing.assert_array_equal([i.w for i in recovery.iterations], [i.w for i in run])
     np.testing.assert_array_equal(recovery.w, run[-1].estimate)
     np.testing.assert_array_equal(recovery.intervals, run[-1].intervals)

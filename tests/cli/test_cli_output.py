@@ -52,8 +52,8 @@ def test_recover_lqr_prints_and_writes_the_whole_contract(call, tmp_path):
     assert set(content["seconds"]) == {"total", "forward", "centre", "expert", "recording"}
     assert content["history"][0].keys() >= {"k", "w", "mu", "regret", "certificate", "intervals"}
     assert len(content["history"]) == content["forward_solves"] + content["probe_solves"]
-    assert content["recording"] == "walking.rrd" and "walking.rrd" in out
-    assert inspect_recording(tmp_path / "walking.rrd")["seed"] == 3
+    assert content["recording"] == "lqr.rrd" and "lqr.rrd" in out
+    assert inspect_recording(tmp_path / "lqr.rrd")["seed"] == 3
     assert "ground truth" in out and "certificate" in out and "L1 error" in out
 
 
@@ -128,6 +128,7 @@ def test_terminal_says_how_sure_the_weights_are(call):
     code, out, _ = call("recover", "--domain", "lqr", "--no-record")
     assert code == 0
     for part in ("certificate", "suboptimality of the expert: at most", "weights: the ",
+                 "half widths: from the expert's possible",
                  "of the volume of all is left", "least certain: axis",
                  "features of the expert: known exactly", "L1 error"):  # fmt: skip
         assert part in out, part

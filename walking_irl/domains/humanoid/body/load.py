@@ -19,7 +19,7 @@ from walking_irl.domains.humanoid.body.anatomy import (
     other_side,
     walker_of,
 )
-from walking_irl.errors import InvalidInputError
+from walking_irl.errors import InvalidInputError, reason
 from walking_irl.files import model_path
 
 SHIPPED = {"humanoid": "humanoid.xml", "humanoid-planar": "humanoid_planar.xml"}
@@ -70,7 +70,7 @@ def _load(body: str) -> Walker:
     try:
         model = mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
-        raise InvalidInputError(f"{path} is not a readable MJCF file: {error}") from error
+        raise InvalidInputError(f"{path} is not a readable MJCF file: {reason(error)}") from error
     _check(model, path)
     return walker_of(model, body, path.stem)
 
