@@ -11,9 +11,9 @@ from sentences import RECOVER_KEYS
 
 from walking_irl import __version__
 from walking_irl.cli.main import COMMANDS
-from walking_irl.domains.humanoid.costs.defaults import REFERENCE_WEIGHTS
 from walking_irl.domains.humanoid.gait.files import load_gait
 from walking_irl.domains.humanoid.gait.gait import whole_cycle
+from walking_irl.domains.humanoid.spec import PLANAR as PLANAR_SPEC
 from walking_irl.recording.reader import inspect_recording
 
 PLANAR = ("--domain", "humanoid-planar")
@@ -93,7 +93,7 @@ def test_recover_planar_exactly(call, tmp_path):
 
 @pytest.mark.slow
 def test_gait_writes_every_kind_of_file_and_reads_its_own(call, tmp_path, planar):
-    weights = ",".join(map(str, REFERENCE_WEIGHTS))
+    weights = ",".join(map(str, PLANAR_SPEC.stack.reference_weights))
     argv = ("gait", *PLANAR, "--weights", weights, "--seconds", 2)
     code, out, err = call(
         *argv, "--save", "g.npz", "--png", "g.png", "--json", "g.json", "--record", "g.rrd"
@@ -121,7 +121,7 @@ def test_saved_gait_is_a_demonstration(call, tmp_path, demonstration):
     content = json.loads((tmp_path / "out.json").read_text())
     assert content["w_expert"] is content["l1_error"] is content["seed"] is None
     assert content["contains_expert"] is content["relative_loss"] is None
-    assert np.abs(np.array(content["w"]) - REFERENCE_WEIGHTS).sum() < 0.01
+    assert np.abs(np.array(content["w"]) - PLANAR_SPEC.stack.reference_weights).sum() < 0.01
 
 
 def test_terminal_says_how_sure_the_weights_are(call):
