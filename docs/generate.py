@@ -14,6 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
+from walking_irl.files import model_path
+
 DOCS = Path(__file__).parent
 TARGET = DOCS / "_generated"
 COLUMNS = "96"
@@ -142,8 +144,9 @@ def _compared(name: str) -> str:
 
 
 def _picture(name: str, path: Path) -> None:
-    """Six frames of the reference gait above six of another; drawn once."""
-    if path.exists():
+    """Six frames of the reference gait above six of another; drawn again when gaits have changed."""
+    gaits = model_path("gaits.npz")
+    if path.exists() and path.stat().st_mtime > gaits.stat().st_mtime:
         return
     from walking_irl.domains.humanoid.body.load import load_walker
     from walking_irl.domains.humanoid.gait.gait import whole_cycle

@@ -21,6 +21,7 @@ from typing import IO, NoReturn, cast
 
 from walking_irl import __version__
 from walking_irl.cli import BAD_INPUT, FAILED, INTERRUPTED
+from walking_irl.cli.completion import SHELLS, PrintCompletion
 from walking_irl.cli.output import Output
 from walking_irl.errors import EmptyPolyhedronError, InvalidInputError, WalkingIRLError
 from walking_irl.workers import interrupts_raised
@@ -59,6 +60,12 @@ def build_parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"walking-irl {__version__}")
+    parser.add_argument(
+        "--print-completion",
+        action=PrintCompletion,
+        choices=SHELLS,
+        help='print a script for your shell: eval "$(walking-irl --print-completion bash)"',
+    )
     sub = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name in COMMANDS:
         command = import_module(f"walking_irl.cli.{name}")  # heavy: Ctrl-C is heard during it

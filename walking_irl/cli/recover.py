@@ -17,8 +17,8 @@ from walking_irl.cli.terminal import Terminal, show_report
 from walking_irl.cli.weights import parse_weights
 from walking_irl.domains import DOMAINS, load
 from walking_irl.domains.contract import EXPERTS, Option
-from walking_irl.errors import InvalidInputError
-from walking_irl.files import check_ending, check_outputs, write_json
+from walking_irl.errors import InvalidInputError, WalkingIRLError
+from walking_irl.files import check_ending, check_outputs, write_file, write_json
 from walking_irl.geometry.centres import CENTRES
 from walking_irl.run import session
 from walking_irl.run.checkpoint import Checkpoint, load_checkpoint
@@ -104,6 +104,9 @@ def _add_outputs(out: Any) -> None:
     )
     out.add_argument("--archive", type=Path, help=argparse.SUPPRESS)  # its name until 0.1
     out.add_argument("--json", type=Path, metavar="FILE.json", help="write all figures as JSON")
+    out.add_argument(
+        "--plot", type=Path, metavar="FILE.svg", help="draw how intervals close and regret falls"
+    )
     out.add_argument("--quiet", action="store_true", help="print the result only")
 
 
@@ -136,6 +139,8 @@ def known_options() -> dict[str, Option]:
 
 def run(args: argparse.Namespace, console: Console) -> int:
     """``walking-irl recover``."""
+    if args.plot is not None and (args.walk is not None or args.method is not None):
+        raise InvalidInputError("--plot draws CPIRL's own runs; leave out --walk and --method")
     if args.walk is not None:
         return walk.run(args, _asked(args), console)
     walk.refuse_alone(args)
@@ -158,19 +163,31 @@ def run(args: argparse.Namespace, console: Console) -> int:
     n_known = 0 if before is None else len(before.answers)
     terminal = Terminal(console, rollouts, n_known, args.quiet)
     report = _recovered(setup, before, terminal, domain.defaults.needs_workers)
-    failure = report.failed_write
-    if args.json is not None:  # before the terminal, whose reader may leave
-        try:
-            with interrupts_held():
-                write_json(args.json, report.to_json())
-        except InvalidInputError as error:
-            failure = failure or error
+    failure = _write(report, args) or report.failed_write
     show_report(report, console, terminal.rollouts_written)
     if failure is not None:
         raise failure
     if report.was_interrupted:
         return INTERRUPTED
     return DONE if report.is_success else FAILED
+
+
+def _write(report: Report, args: argparse.Namespace) -> WalkingIRLError | None:
+    """Files of results, before the terminal, whose reader may leave; what cannot be written."""
+    try:
+        with interrupts_held():
+            if args.json is not None:
+                write_json(args.json, report.to_json())
+            if args.plot is not None:
+                from walking_irl.experiments.recovery_picture import recovery_picture
+
+                setup, names = report.problem.setup, [o.name for o in report.objectives]
+                title = f"{report.problem.domain.question} ({setup.domain})"
+                picture = recovery_picture(title, names, report.iterations, report.w_expert)
+                write_file(args.plot, picture.encode())
+    except InvalidInputError as error:
+        return error
+    return None
 
 
 def _recovered(
@@ -207,7 +224,8 @@ def _rename_archive(args: argparse.Namespace, console: Console) -> None:
 def _check_files(setup: Setup, rollouts: Path | None, args: argparse.Namespace) -> None:
     check_ending(setup.record, ".rrd")
     check_ending(setup.checkpoint, ".npz")
-    outputs = [setup.record, rollouts, args.json]
+    check_ending(args.plot, ".svg")
+    outputs = [setup.record, rollouts, args.json, args.plot]
     check_outputs([*outputs, setup.checkpoint], inputs=[setup.demonstration])
     if args.resume is not None:  # its checkpoint goes on in the same file
         check_outputs(outputs, inputs=[args.resume])

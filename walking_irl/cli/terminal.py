@@ -30,6 +30,7 @@ from walking_irl.run.problem import Problem
 from walking_irl.run.report import Report, progress_line
 from walking_irl.types import Iteration, Rule
 
+INTERVAL = "interval: what a weight may be, given all that was seen (no confidence interval)"
 NO_GAIN = 1e-6
 """Share of the return by which a solver may beat another by chance."""
 
@@ -106,6 +107,7 @@ class Terminal:
 def show_report(report: Report, console: Console, rollouts: Path | None) -> None:
     """Print the table of weights and the figures below it."""
     console.print(_weights_table(report))
+    console.print(INTERVAL)
     out = report.to_json()
     console.print(f"ended: {report.status}")
     found = report.summary

@@ -6,6 +6,7 @@ import csv
 import io
 import os
 import platform
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -29,6 +30,17 @@ COLUMNS = (
     "final t_k",
     "final interval width",
 )
+
+ABBREVIATIONS = {
+    "AC": "analytic centre",
+    "CG": "centre of gravity",
+    "MVIE": "centre of the largest inscribed ellipsoid",
+    "CC": "Chebyshev centre",
+    "MWAL": "multiplicative weights for apprenticeship learning (Syed and Schapire)",
+    "LPAL": "linear program for apprenticeship learning (Syed, Bowling and Schapire)",
+    "LQR": "linear-quadratic regulator",
+    "MDP": "Markov decision process",
+}
 
 
 @dataclass(frozen=True)
@@ -61,7 +73,8 @@ class Table:
         lines += [f"- {key}: {value}" for key, value in self.header.items()] + [""]
         lines += [_markdown(self.columns), "|" + " --- |" * len(self.columns)]
         lines += [_markdown(row) for row in self.rows]
-        return "\n".join([*lines, "", *(f"- {note}" for note in self.notes), ""])
+        notes = [*self.notes, *spelt_out([self.title, *(c for row in self.rows for c in row)])]
+        return "\n".join([*lines, "", *(f"- {note}" for note in notes), ""])
 
     def to_csv(self) -> str:
         """Columns and rows only."""
@@ -88,6 +101,17 @@ class Table:
         write_json(paths[2], {**content, "header": self.header, "outcomes": list(self.raw)})
         write_file(paths[3], self.picture().encode())
         return paths
+
+
+def spelt_out(texts: Sequence[str]) -> list[str]:
+    """One note on the abbreviations in some texts, or none.
+
+    >>> spelt_out(["CPIRL-AC, level"])
+    ['AC: analytic centre']
+    """
+    words = set(re.findall(r"\w+", " ".join(texts)))
+    known = [f"{short}: {long}" for short, long in ABBREVIATIONS.items() if short in words]
+    return ["; ".join(known)] if known else []
 
 
 def _markdown(cells: Sequence[str]) -> str:

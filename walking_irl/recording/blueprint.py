@@ -130,7 +130,7 @@ def _history(experiment: Experiment) -> rrb.Container:
 
 
 def _certificate(experiment: Experiment) -> rrb.View:
-    """Figures that fall; the legend stands where they come last."""
+    """Figures that fall: their legend stands where they do not come."""
     largest = float(np.abs(experiment.expert.mu).sum())
     top = 0.3 + max(0.0, math.log10(max(largest, 1.0)))
     return rrb.TimeSeriesView(
@@ -139,7 +139,7 @@ def _certificate(experiment: Experiment) -> rrb.View:
         name="Powers of ten: certificate, regret, loss, volume",
         axis_x=_whole_run(),
         axis_y=rrb.ScalarAxis(range=(math.log10(FLOOR), top)),
-        plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftBottom),
+        plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
         background=rrb.archetypes.PlotBackground(color=style.PAPER, show_grid=False),
     )
 

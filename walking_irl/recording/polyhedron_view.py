@@ -50,13 +50,13 @@ class _Point(NamedTuple):
     """Ends of lines about it, shape (n, 2, 3)."""
 
 
-CROSS = 0.055 * np.stack([np.eye(3), -np.eye(3)], axis=1)
+CROSS = 0.075 * np.stack([np.eye(3), -np.eye(3)], axis=1)
 """Three lines along the axes: the ground truth."""
-DIAMOND = 0.028 * np.array(
+DIAMOND = 0.042 * np.array(
     [[a * u, b * v] for u, v in combinations(np.eye(3), 2) for a in (1, -1) for b in (1, -1)]
 )
 """Edges of an octahedron: the estimate."""
-LINE = 1.8
+LINE = 1.5
 """Width of these lines [points of the screen]."""
 
 

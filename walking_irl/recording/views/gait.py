@@ -71,7 +71,7 @@ class WalkerView:
                 names = [f"{name} learner", f"{name} expert"]
                 lines = rr.SeriesLines(names=names, colors=[style.LEARNER, style.EXPERT])
             stream.log(_joint_path(name), lines, static=True)
-        names = ["learner", "expert"][: 2 if self.expert is not None else 1]
+        names = ["walker"] if self.expert is None else ["learner", "expert"]
         colours = [style.LEARNER, style.EXPERT][: len(names)]
         for path in (SPEED, FORCE):
             stream.log(path, rr.SeriesLines(names=names, colors=colours), static=True)
