@@ -68,9 +68,8 @@ def test_no_weights_are_told_of_what_is_no_habit_of_this_body(walked, monkeypatc
 
 @pytest.mark.slow
 def test_a_person_s_answer_comes_in_its_order(walked, monkeypatch, capsys, tmp_path):
-    """One start and one turn; the model's own walk is nearly optimal for its own weights."""
+    """One start; the model's own walk is nearly optimal for its own weights."""
     monkeypatch.setattr(module, "starting_weights", lambda reference: reference[None])
-    monkeypatch.setattr(module, "ROUNDS", 1)
     argv = ["recover", "--walk", walked, "--walk", walked, "--json", "out.json", "--no-record"]
     again = command._explain
     known = []

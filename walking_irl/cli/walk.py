@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from walking_irl.run.walk import Explanation
 
 RESTS_ON = (
-    "5. What it rests on: a body of 1.75 m and 75 kg with these objectives (the recording is "
+    "5. What it rests on: one body with these objectives for everybody (the recording is "
     "scaled to its legs); of all gaits as near to the recording, the one that is cheapest for the "
     "weights; joint angles alone, forces are compared only; habits, pain and muscles that the body "
     "has not got count as weights."
@@ -120,7 +120,8 @@ def _explain(
 ) -> Answer:
     from walking_irl.domains.humanoid.recorded.feasible import check_habit
     from walking_irl.domains.humanoid.spec import HUMANOID
-    from walking_irl.run.walk import Walk, explain, nearest
+    from walking_irl.run.joint import Walk
+    from walking_irl.run.walk import explain, nearest
 
     walks = [Walk(p.gait, p.missing) for p in (person, *trials)]
     names = escape(", ".join(p.name for p in person.sources))
@@ -147,20 +148,20 @@ def _say(text: str, args: argparse.Namespace, console: Console) -> None:
 
 def _show(answer: Answer, spec: Any, console: Console) -> None:
     """The answer, in the order in which it should be read."""
-    found, person, last = answer.found, answer.person, answer.found.last
-    worst = sorted(last.near.degrees, key=lambda n: -last.near.degrees[n])[:3]
-    places = ", ".join(f"{n} {last.near.degrees[n]:.1f}" for n in worst)
-    low, high = (100 * b for b in last.bracket)
+    found, person, end = answer.found, answer.person, answer.found.end
+    worst = sorted(end.near.degrees, key=lambda n: -end.near.degrees[n])[:3]
+    places = ", ".join(f"{n} {end.near.degrees[n]:.1f}" for n in worst)
+    low, high = (100 * b for b in found.bracket)
     console.print(
         f"\n[bold]{escape(answer.name)}[/bold]\n"
-        f"1. How near the body comes: {last.near.sagittal:.1f} degrees at hips, knees and ankles "
+        f"1. How near the body comes: {end.near.sagittal:.1f} degrees at hips, knees and ankles "
         f"(farthest: {places}).\n"
         f"2. Such a walk costs {low:.1f} to {high:.1f} % more than the best one for the weights "
         "that speak most for it.\n"
         "3. These weights:"
     )
     console.print(_weights(answer, spec))
-    best, shown = last.best, person.gait
+    best, shown = end.gait, person.gait
     console.print(
         f"4. The best gait for them: {found.sagittal:.1f} degrees from the recording at hips, "
         f"knees and ankles; {best.speed:.2f} m/s ({shown.speed:.2f}), "
@@ -188,7 +189,7 @@ def _forces(answer: Answer, spec: Any) -> str:
         return ""
     near, best = (
         force_apart(spec.walker, gait, force[:, 2])
-        for gait in (answer.found.last.near.gait, answer.found.last.best)
+        for gait in (answer.found.end.near.gait, answer.found.end.gait)
     )
     return (
         f"; vertical force {best:.2f} body weights from the measured one over stance "

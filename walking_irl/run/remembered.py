@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,18 +23,23 @@ class Remembered:
     Args:
         start: Gait from which solves start.
         spec: Which body, and its costs.
+        answers: Weights and responses that are known already.
 
     Attributes:
         solves: Forward solves so far.
         answers: Weights and responses so far.
     """
 
-    def __init__(self, start: Gait, spec: WalkerSpec) -> None:
+    def __init__(
+        self, start: Gait, spec: WalkerSpec, answers: Sequence[tuple[Array, Response]] = ()
+    ) -> None:
         K = len(spec.stack.objectives)
         self.forward = WarmStartSolver(start, spec, mu=np.zeros(K))  # 0: beaten by nobody
         self.forward.found += known_gaits(spec)
         self.solves = 0
-        self.answers: list[tuple[Array, Response]] = []
+        self.answers = list(answers)
+        for _, response in answers:
+            self.forward.recall(response)
 
     def __call__(self, w: Array) -> Response:
         """The response, with the features of all policies found before."""
@@ -50,8 +56,11 @@ class Remembered:
         return np.asarray(np.unique(np.array(rows), axis=0))
 
     def sensitivity(self, w: Array) -> Array:
-        """Of the answer nearest to weights that has one; (K, K)."""
+        """Of the answer nearest to weights that has one, else the identity: (K, K).
+
+        Its steps are short ones down the gradient, and its half widths are wide.
+        """
         known = [(v, r.sensitivity) for v, r in self.answers if r.sensitivity is not None]
         if not known:
-            return np.full((len(w), len(w)), 0.0)
+            return np.eye(len(w))
         return min(known, key=lambda a: float(np.abs(a[0] - w).sum()))[1]
