@@ -131,6 +131,13 @@ def test_weights_asked_twice_are_solved_once_and_every_answer_is_kept(truth):
     assert (forward.policies() @ TRUTH).max() <= first.mu @ TRUTH + 1e-6  # the best is its own
 
 
+def test_a_gait_that_was_met_bounds_what_weights_are_worth(truth):
+    forward = Remembered(truth, PLANAR)
+    forward.meet(truth, np.full(6, 0.5))  # better than any gait
+    assert forward(TRUTH).mu @ TRUTH < -0.5
+    assert forward.value(TRUTH) == pytest.approx(-0.5)
+
+
 def test_without_a_sensitivity_steps_follow_the_gradient(truth):
     assert np.array_equal(Remembered(truth, PLANAR).sensitivity(TRUTH), np.eye(6))
 

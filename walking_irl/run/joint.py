@@ -124,8 +124,9 @@ def _point(
     spec: WalkerSpec, walk: Walk, w: Array, near: Sequence[Gait], forward: Remembered
 ) -> Point:
     y = feasible_gait(spec, walk.shown, w, missing=walk.missing, near=near)
+    forward.meet(y.gait, y.total_costs)
     best = forward(w)
-    return Point(w, y, best, float(w @ (y.total_costs + best.mu)) + y.pull)
+    return Point(w, y, best, float(w @ y.total_costs) + forward.value(w) + y.pull)
 
 
 def _step(spec: WalkerSpec, walk: Walk, here: Point, forward: Remembered) -> Point | None:

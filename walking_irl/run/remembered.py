@@ -9,7 +9,7 @@ import numpy as np
 
 from walking_irl.arrays import Array
 from walking_irl.domains.humanoid.gait.gait import Gait
-from walking_irl.domains.humanoid.learner import WarmStartSolver, known_gaits
+from walking_irl.domains.humanoid.learner import Start, WarmStartSolver, known_gaits
 from walking_irl.domains.humanoid.spec import WalkerSpec
 from walking_irl.types import Response
 
@@ -37,6 +37,7 @@ class Remembered:
         self.forward = WarmStartSolver(start, spec, mu=np.zeros(K))  # 0: beaten by nobody
         self.forward.found += known_gaits(spec)
         self.solves = 0
+        self.met: list[Array] = []
         self.answers = list(answers)
         for _, response in answers:
             self.forward.recall(response)
@@ -50,9 +51,18 @@ class Remembered:
             self.answers.append((w, known))
         return replace(known, evaluated=self.policies())
 
+    def meet(self, gait: Gait, total_costs: Array) -> None:
+        """Learn of a gait that is no answer: it may be a start, and it bounds every answer."""
+        self.forward.found.append(Start(gait.to_vector(), total_costs))
+        self.met.append(-total_costs)
+
+    def value(self, w: Array) -> float:
+        """V(w), the most that any policy known is worth."""
+        return float((self.policies() @ w).max())
+
     def policies(self) -> Array:
-        """Features of all policies evaluated, shape (n, K)."""
-        rows = [m for _, r in self.answers for m in (r.mu, *r.evaluated)]
+        """Features of all policies known, shape (n, K)."""
+        rows = [m for _, r in self.answers for m in (r.mu, *r.evaluated)] + self.met
         return np.asarray(np.unique(np.array(rows), axis=0))
 
     def sensitivity(self, w: Array) -> Array:
