@@ -19,6 +19,7 @@ import numpy as np
 from bench import table, verdict
 
 from walking_irl.cpirl.loop import cpirl
+from walking_irl.cpirl.probes import Probing
 from walking_irl.domains.contract import Request
 from walking_irl.domains.humanoid import domain as domain_module
 from walking_irl.domains.humanoid.closed_loop.trials import measure
@@ -28,7 +29,6 @@ from walking_irl.domains.humanoid.optimiser import newton
 from walking_irl.domains.humanoid.optimiser.linearisation import Linearisation, Weighted
 from walking_irl.domains.humanoid.optimiser.ring import BorderedMatrix, Factor
 from walking_irl.domains.humanoid.optimiser.transcription import Transcription
-from walking_irl.run.session import PROBE
 from walking_irl.types import Expert, Iteration
 
 EVALUATIONS = "MuJoCo's inverse dynamics"
@@ -129,7 +129,7 @@ def recover(
         min_weight=domain.defaults.min_weight,
         rng=np.random.default_rng(seed),
         measure=None if measured is None else clock.wrap(MEASURE, measured),
-        probe=PROBE,
+        probe=Probing(),
     )
     with timers(clock), clock.part(QUERIES):
         return list(steps)

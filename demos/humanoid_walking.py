@@ -21,8 +21,6 @@ from walking_irl.recording import Experiment, Recorder
 from walking_irl.recording.views.registry import world_of
 from walking_irl.workers import workers
 
-PROBE = 1e-4
-
 
 def main() -> None:
     """Make an expert, recover its weights, record how."""
@@ -51,7 +49,7 @@ def main() -> None:
             min_weight=domain.defaults.min_weight,
             rng=np.random.default_rng(args.seed),
             measure=learner.measure,
-            probe=Probing(PROBE, executor),
+            probe=Probing(executor=executor),
         )
         experiment = Experiment(
             domain=domain.name,

@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 
-from walking_irl.domains.humanoid.costs.defaults import REFERENCE_WEIGHTS
 from walking_irl.domains.humanoid.domain import Humanoid
 from walking_irl.domains.humanoid.gait.gait import Gait, whole_cycle
 from walking_irl.domains.humanoid.gait.pictures import SIDE, photograph
@@ -38,12 +37,13 @@ def main() -> None:
 
     domain = Humanoid("humanoid-planar" if args.planar else "humanoid")
     names = [o.name for o in domain.objectives]
+    reference = domain.spec.stack.reference_weights
     gaits: dict[str, Gait] = {}
     costs = []
     print("weighed most" + "".join(f"{name:>10s}" for name in names) + "       m/s")
     with workers() as executor:
         for j, name in enumerate(names):
-            w = REFERENCE_WEIGHTS * np.where(np.arange(len(names)) == j, TIMES, 1.0)
+            w = reference * np.where(np.arange(len(names)) == j, TIMES, 1.0)
             response = domain.forward(w / w.sum(), executor)
             gaits[name] = response.policy
             costs.append(-response.mu)

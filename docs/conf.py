@@ -7,6 +7,7 @@ because a tutorial is a script that a test runs, too.
     python -m sphinx -W --keep-going -b html docs docs/_build
 """
 
+import inspect
 import os
 import re
 import sys
@@ -31,7 +32,6 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
     "sphinx.ext.mathjax",
-    "sphinx.ext.viewcode",
     "sphinx_gallery.gen_gallery",
 ]
 exclude_patterns = ["_build", "tables", "tutorials/*.md", "tutorials/*.rst", "_generated/parts"]
@@ -51,10 +51,11 @@ apidoc_modules = [
         "exclude_patterns": ["../walking_irl/__main__.py"],
         "separate_modules": True,
         "module_first": True,
-        "automodule_options": {"members", "show-inheritance", "ignore-module-all"},
+        "automodule_options": {"members", "show-inheritance"},
     }
 ]
 autodoc_member_order = "bysource"
+autodoc_default_options = {"ignore-module-all": True}  # a name is described where it is defined
 autodoc_typehints = "signature"
 autodoc_type_aliases = {name: name for name in ("Array", "Indices", "Forward", "Actions")}
 autodoc_preserve_defaults = True
@@ -62,7 +63,9 @@ napoleon_google_docstring, napoleon_numpy_docstring = True, False
 napoleon_use_ivar = True
 suppress_warnings = ["ref.python"]  # a short name such as .Step may mean two; the nearest is taken
 nitpick_ignore_regex = [
-    ("py:(class|obj)", r".*\.Motion(_contra)?"),  # type variables
+    ("py:(class|obj)", r".*\.(Motion|Trajectory)(_contra)?"),  # type variables
+    ("py:(class|obj)", r"walking_irl\..*\._\w+"),  # private
+    ("py:class", r"walking_irl\.geometry\.centres\.Centre"),  # described where it is defined
     ("py:class", "(?!walking_irl).*"),  # types of other packages and of the standard library
     ("py:(func|mod|meth|attr|data|exc|obj)", "(?!walking_irl).*"),
 ]
@@ -82,7 +85,10 @@ sphinx_gallery_conf = {
 
 
 def _is_noise(app, what, name, obj, skip, options):
-    """Fields of named tuples without a text of their own say nothing."""
+    """Functions of other packages, and fields of named tuples without a text of their own."""
+    home = getattr(obj, "__module__", None) or "walking_irl"
+    if what == "module" and inspect.isroutine(obj) and not home.startswith("walking_irl"):
+        return True
     text = getattr(obj, "__doc__", None) or ""
     return True if re.match(r"Alias for field number \d+$", text) else None
 
@@ -93,7 +99,7 @@ def _bars(app, what, name, obj, options, lines):
     for i, line in enumerate(lines):
         is_indented = line.startswith((" ", "\t"))
         in_maths = line.lstrip().startswith(".. math::") or (in_maths and (is_indented or not line))
-        if not in_maths and not line.lstrip().startswith(("|", "+-")):
+        if not in_maths and not line.lstrip().startswith(("| ", "+-")):
             parts = line.split("`")
             lines[i] = "`".join([p.replace("|", r"\|") if k % 2 == 0 else p
                                  for k, p in enumerate(parts)])  # fmt: skip

@@ -17,6 +17,8 @@ import numpy as np
 DOCS = Path(__file__).parent
 TARGET = DOCS / "_generated"
 COLUMNS = "96"
+BODY = "humanoid-planar"
+"""Whose gaits are compared."""
 
 
 def write_all() -> None:
@@ -90,7 +92,7 @@ def _number(path: Path) -> tuple[int, ...]:
 
 def objectives() -> dict[str, str]:
     """One page per objective of the humanoid: what it is, and what three times more of it does."""
-    from walking_irl.domains.humanoid.costs.objectives import OBJECTIVES, REFERENCE_WEIGHTS
+    from walking_irl.domains.humanoid.costs.defaults import OBJECTIVES, REFERENCE_WEIGHTS
 
     pages = {}
     for i, o in enumerate(OBJECTIVES):
@@ -118,11 +120,10 @@ def objectives() -> dict[str, str]:
 
 def _compared(name: str) -> str:
     """Speed, cadence, step and costs of a shipped gait beside the reference."""
-    from walking_irl.domains.humanoid.costs.objectives import OBJECTIVES
-
+    from walking_irl.domains.humanoid.costs.defaults import OBJECTIVES
     from walking_irl.domains.humanoid.gait.library import load_library
 
-    library = load_library(True)
+    library = load_library(BODY)
     both = [library["reference"], library[name]]
     rows = ["| | reference | more of it | change |", "|---|---|---|---|"]
 
@@ -134,7 +135,9 @@ def _compared(name: str) -> str:
     rows.append(row("steps per minute", [60 / s.gait.half_period for s in both], ".0f"))
     rows.append(row("step length [m]", [s.gait.step_length for s in both], ".2f"))
     for i, o in enumerate(OBJECTIVES):
-        rows.append(row(f"cost per metre: {o.name}", [float(s.folded[i]) for s in both], ".3f"))
+        rows.append(
+            row(f"cost per metre: {o.name}", [float(s.total_costs[i]) for s in both], ".3f")
+        )
     return "\n".join(rows) + "\n"
 
 
@@ -142,14 +145,14 @@ def _picture(name: str, path: Path) -> None:
     """Six frames of the reference gait above six of another; drawn once."""
     if path.exists():
         return
-    from walking_irl.domains.humanoid.body.anatomy import load_walker
+    from walking_irl.domains.humanoid.body.load import load_walker
     from walking_irl.domains.humanoid.gait.gait import whole_cycle
     from walking_irl.domains.humanoid.gait.library import load_library
     from walking_irl.domains.humanoid.gait.pictures import SIDE, photograph, write_png
 
-    walker, rows = load_walker(True), []
+    walker, rows = load_walker(BODY), []
     for key in ("reference", name):
-        q = whole_cycle(load_library(True)[key].gait, walker.mirror)
+        q = whole_cycle(load_library(BODY)[key].gait, walker.mirror)
         chosen = [(q[i], SIDE) for i in np.linspace(0, len(q), 6, endpoint=False).astype(int)]
         rows.append(np.hstack(photograph(walker, chosen, height=300, width=160)))
     write_png(np.vstack(rows), path)

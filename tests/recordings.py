@@ -13,7 +13,7 @@ from walking_irl.recording import Experiment, Recorder
 from walking_irl.recording.style import PLAYBACK_RATE
 from walking_irl.recording.views.gait import WalkerView
 from walking_irl.recording.views.motion import periodic_rollout
-from walking_irl.types import Expert, Iteration, Objective, Response, Rollout, Rule, Status
+from walking_irl.types import Bracket, Expert, Iteration, Objective, Response, Rollout, Rule, Status
 
 MJCF = """
 <mujoco><option timestep="0.01"/>
@@ -67,6 +67,7 @@ def run(K: int, n: int = 4, seed: int = 0) -> tuple[Experiment, list[Iteration]]
             Iteration(
                 k, polyhedron, w, Rule.CENTRE, Response(None, mu), regret, best[0], best[0] / 2,
                 after.intervals(), best[1], Status.CUT if k < n - 1 else Status.BUDGET,
+                bracket=Bracket(-best[0] / 2, best[0]),
             )
         )  # fmt: skip
         polyhedron = after

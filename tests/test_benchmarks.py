@@ -19,15 +19,18 @@ ROWS = {
         "rollout: policy, all recorded",
     ],
     "evaluated_policies": ["lqr, queries alone", "lqr, demonstration", "gridworld, iterates"],
+    "faults": ["kill -9", "Ctrl-C", "SIGTERM", "full disk"],
     "forward_solver": ["gait solver, one iteration", "mujoco.minimize.least_squares"],
     "growth": ["3-D, 40 knots, 6 objectives", "80 knots", "planar", "9 objectives"],
     "recovery": ["MuJoCo's inverse dynamics", "linear algebra", "Hessians", "queries"],
 }
+SLOW = ("recovery", "faults")
 HEADLINES = {
     "centres": r"^ac: .* \(target >= 5\): .*\n^cc: .*\n^mvie: ",
     "closed_loop": r"^2 walks of 3 s: \d falls .*\n^pushes of 80 N: \d of 4 .*\n^pushes of 150 N: ",
     "environment": r"^policy in the loop: \d\.\d\d of .* \(target >= 0\.5\): (met|NOT MET)$",
     "evaluated_policies": r"^lqr: \d+\.\d\d x fewer solves .*\n^gridworld: .* \(1 experts?\)$",
+    "faults": r"^\d+ of \d+ faults survived: met$",
     "forward_solver": r"^one iteration takes .* \(target <= 33\): .*\n^derivatives are .* faster",
     "growth": r"^2 threads: .*\n^time grows with the power .* \(target <= 1\.2\): (met|NOT MET)$",
     "recovery": r"^queries take \d+\.\d% of .* \(target <= 5 %\): (met|NOT MET)$",
@@ -54,7 +57,7 @@ def test_every_benchmark_is_tested():
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=pytest.mark.slow) if n == "recovery" else n for n in ROWS]
+    "name", [pytest.param(n, marks=pytest.mark.slow) if n in SLOW else n for n in ROWS]
 )
 def test_benchmark_prints_its_table_and_headline(name):
     text = output(name)

@@ -11,7 +11,7 @@ import walking_irl
 from walking_irl.domains import DOMAINS
 
 ROOT = Path(walking_irl.__file__).parent
-LEAVES = {"arrays", "errors", "types", "expert", "files", "versions", "workers"}
+LEAVES = {"archives", "arrays", "errors", "types", "expert", "files", "versions", "workers"}
 ALLOWED = {
     "geometry": {"arrays", "errors"},
     "cpirl": LEAVES | {"geometry"},

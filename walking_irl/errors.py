@@ -45,3 +45,10 @@ class FallError(WalkingIRLError):
 
 class RecordingError(WalkingIRLError):
     """A recording cannot be written or read."""
+
+
+def reason(error: BaseException) -> str:
+    """What an error of other code says, as part of a sentence: one short line of readable text."""
+    text = " ".join(str(error).split()) or type(error).__name__
+    readable = "".join(c if c.isprintable() else "?" for c in text)
+    return readable if len(readable) <= 200 else f"{readable[:200]} ..."

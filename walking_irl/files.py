@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walking_irl.errors import InvalidInputError, WalkingIRLError
+from walking_irl.workers import interrupts_held
 
 _PACKAGE = Path(__file__).resolve().parent
 
@@ -65,7 +66,7 @@ def write_file(
     """
     check_name(path, error)
     part = _part_of(path)
-    with _explained(path, error):
+    with _explained(path, error), interrupts_held():
         try:
             with part.open("xb") as file:
                 file.write(content)

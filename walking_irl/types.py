@@ -94,7 +94,7 @@ class Status(enum.Enum):
     DOMINATED = "one policy is at least as good as the expert in every feature"
     MIXTURE_DOMINATES = "a mixture of the policies found is at least as good in every feature"
     EMPTY = "no weight satisfies every cut: the expert is not optimal, or its features are off"
-    NOT_OPTIMAL = "the expert is not exactly optimal for any weights; these explain it best"
+    NOT_OPTIMAL = "the expert is not exactly optimal for any weights allowed; these explain it best"
     CONTRADICTED = (
         "the expert is not optimal, which this mode takes for granted: policies beat it under all "
         "weights; ask for the least regret, mode minimise"

@@ -1,14 +1,21 @@
-"""Independent work, side by side: a pool of processes, or one task after the other."""
+"""Independent work, side by side: a pool of processes, or one task after the other; interrupts."""
 
 from __future__ import annotations
 
 import os
 import signal
+import threading
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor
 from contextlib import contextmanager
-from multiprocessing import get_context
+from multiprocessing import current_process, get_context, parent_process
+from multiprocessing.connection import wait
 from typing import Any
+
+from walking_irl.errors import InvalidInputError
+
+_heard: list[int] = []
+"""Interrupts that were raised while :func:`interrupts_raised`."""
 
 
 def run_tasks(
@@ -22,19 +29,33 @@ def run_tasks(
 
 @contextmanager
 def workers() -> Iterator[Executor]:
-    """A process pool of the machine's cores; an interrupt reaches this process only."""
+    """A process pool of the machine's cores; an interrupt reaches this process only.
+
+    The pool's processes end with this one, however it ends.
+
+    Raises:
+        InvalidInputError: If its processes cannot start, since they run the caller's script again.
+    """
+    if getattr(current_process(), "_inheriting", False):  # a new process runs the script
+        os._exit(1)  # without 150 lines of stack traces; the parent says it in one sentence
     count = os.cpu_count() or 1
     pool = ProcessPoolExecutor(
         count,
         mp_context=get_context("spawn"),
-        initializer=signal.signal,
-        initargs=(signal.SIGINT, signal.SIG_IGN),
+        initializer=_begin,
     )
     try:
-        with _interrupts_held():
-            for _ in range(count):
-                pool.submit(os.getpid)  # starts a process, which inherits the held signal
-        yield pool
+        with _interrupts_blocked():  # each starts a process, which inherits the blocked signal
+            started = [pool.submit(os.getpid) for _ in range(count)]
+        try:
+            yield pool
+        except BrokenExecutor as error:
+            if any(f.done() and f.exception() is None for f in started):
+                raise
+            raise InvalidInputError(
+                "worker processes could not start; a script that uses them needs its code under "
+                'if __name__ == "__main__":, because each of them reads the script'
+            ) from error
         pool.shutdown()
     except BaseException:
         for process in list((pool._processes or {}).values()):
@@ -43,8 +64,80 @@ def workers() -> Iterator[Executor]:
         raise
 
 
+def _begin() -> None:
+    """In a new process: leave interrupts to the parent, and do not outlive it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    assert parent is not None  # it is a pool's
+    wait([parent.sentinel])
+    os._exit(1)  # nobody waits for what it does
+
+
 @contextmanager
-def _interrupts_held() -> Iterator[None]:
+def interrupts_raised() -> Iterator[None]:
+    """Ctrl-C and SIGTERM, what ``kill`` and batch systems send, raise ``KeyboardInterrupt``."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {number: signal.signal(number, _raise) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        with interrupts_kept():
+            yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _raise(number: int, frame: Any) -> None:
+    _heard.append(number)
+    raise KeyboardInterrupt
+
+
+@contextmanager
+def interrupts_kept() -> Iterator[None]:
+    """An interrupt that foreign code has turned into another error is an interrupt all the same.
+
+    NumPy's dtype promotion, for one, raises ``TypeError`` in place of whatever it was hit by.
+    """
+    before = len(_heard)
+    try:
+        yield
+    except Exception as error:
+        if len(_heard) > before:
+            raise KeyboardInterrupt from error
+        raise
+
+
+@contextmanager
+def interrupts_held() -> Iterator[None]:
+    """Ctrl-C and SIGTERM wait until the block ends; for what must be done as a whole, and is short.
+
+    Handlers of other threads and of other programs stay as they are.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    waiting: list[int] = []
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        for number, handler in before.items():
+            if handler is not None and handler is not signal.SIG_IGN:
+                signal.signal(number, lambda got, frame: waiting.append(got))
+        yield
+    finally:
+        for number, handler in before.items():
+            if handler is not None:
+                signal.signal(number, handler)
+        if waiting:
+            signal.raise_signal(waiting[0])
+
+
+@contextmanager
+def _interrupts_blocked() -> Iterator[None]:
     """Ctrl-C waits: it would hit processes that cannot ignore it yet, and they would say so."""
     if not hasattr(signal, "pthread_sigmask"):
         yield

@@ -113,7 +113,7 @@ def test_interrupt_keeps_what_is_done(call, tmp_path, monkeypatch):
     content = json.loads((tmp_path / "out.json").read_text())
     assert content["status"] == "interrupted" and len(content["history"]) == 3
     assert content.keys() >= RECOVER_KEYS
-    inspected = inspect_recording(tmp_path / "walking.rrd")
+    inspected = inspect_recording(tmp_path / "lqr.rrd")
     assert inspected["ending"] == "interrupted" and inspected["iterations"] == 2
 
 

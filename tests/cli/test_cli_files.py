@@ -57,12 +57,12 @@ def test_full_disk_loses_the_recording_but_not_the_result(call, tmp_path, little
     assert code == 2 and "too large" in one_sentence(err)
     assert "L1 error" in out and "walking-irl view" not in out
     assert json.loads((tmp_path / "out.json").read_text())["recording"] is None
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["out.json", "walking.checkpoint.npz"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["lqr.checkpoint.npz", "out.json"]
 
 
 def test_full_disk_keeps_an_older_file(call, tmp_path, little_space):
     (tmp_path / "walking.rrd").write_text("older")
-    assert call("recover", "--domain", "lqr", "--quiet")[0] == 2
+    assert call("recover", "--domain", "lqr", "--quiet", "--record", "walking.rrd")[0] == 2
     assert (tmp_path / "walking.rrd").read_text() == "older"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["walking.checkpoint.npz", "walking.rrd"]
 

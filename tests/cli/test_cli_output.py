@@ -11,9 +11,9 @@ from sentences import RECOVER_KEYS
 
 from walking_irl import __version__
 from walking_irl.cli.main import COMMANDS
-from walking_irl.domains.humanoid.costs.defaults import REFERENCE_WEIGHTS
 from walking_irl.domains.humanoid.gait.files import load_gait
 from walking_irl.domains.humanoid.gait.gait import whole_cycle
+from walking_irl.domains.humanoid.spec import PLANAR as PLANAR_SPEC
 from walking_irl.recording.reader import inspect_recording
 
 PLANAR = ("--domain", "humanoid-planar")
@@ -52,8 +52,8 @@ def test_recover_lqr_prints_and_writes_the_whole_contract(call, tmp_path):
     assert set(content["seconds"]) == {"total", "forward", "centre", "expert", "recording"}
     assert content["history"][0].keys() >= {"k", "w", "mu", "regret", "certificate", "intervals"}
     assert len(content["history"]) == content["forward_solves"] + content["probe_solves"]
-    assert content["recording"] == "walking.rrd" and "walking.rrd" in out
-    assert inspect_recording(tmp_path / "walking.rrd")["seed"] == 3
+    assert content["recording"] == "lqr.rrd" and "lqr.rrd" in out
+    assert inspect_recording(tmp_path / "lqr.rrd")["seed"] == 3
     assert "ground truth" in out and "certificate" in out and "L1 error" in out
 
 
@@ -93,7 +93,7 @@ def test_recover_planar_exactly(call, tmp_path):
 
 @pytest.mark.slow
 def test_gait_writes_every_kind_of_file_and_reads_its_own(call, tmp_path, planar):
-    weights = ",".join(map(str, REFERENCE_WEIGHTS))
+    weights = ",".join(map(str, PLANAR_SPEC.stack.reference_weights))
     argv = ("gait", *PLANAR, "--weights", weights, "--seconds", 2)
     code, out, err = call(
         *argv, "--save", "g.npz", "--png", "g.png", "--json", "g.json", "--record", "g.rrd"
@@ -121,13 +121,14 @@ def test_saved_gait_is_a_demonstration(call, tmp_path, demonstration):
     content = json.loads((tmp_path / "out.json").read_text())
     assert content["w_expert"] is content["l1_error"] is content["seed"] is None
     assert content["contains_expert"] is content["relative_loss"] is None
-    assert np.abs(np.array(content["w"]) - REFERENCE_WEIGHTS).sum() < 0.01
+    assert np.abs(np.array(content["w"]) - PLANAR_SPEC.stack.reference_weights).sum() < 0.01
 
 
 def test_terminal_says_how_sure_the_weights_are(call):
     code, out, _ = call("recover", "--domain", "lqr", "--no-record")
     assert code == 0
     for part in ("certificate", "suboptimality of the expert: at most", "weights: the ",
+                 "half widths: from the expert's possible",
                  "of the volume of all is left", "least certain: axis",
                  "features of the expert: known exactly", "L1 error"):  # fmt: skip
         assert part in out, part

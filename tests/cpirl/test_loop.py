@@ -131,7 +131,8 @@ def test_level_mode_dominates_suboptimal_experts(K):
         problem = LQR(K, perturbation=0.25)
         expert = problem.expert(w_E, rng)
         last = list(cpirl(problem.forward, expert, mode="minimise", rng=rng, max_solves=30))[-1]
-        assert last.status is Status.DOMINATED
+        is_clear = last.best_regret > 1e-3 * abs(last.estimate @ expert.mu)
+        assert last.status is (Status.DOMINATED if is_clear else Status.NOT_OPTIMAL)
         assert np.all(last.response.mu >= expert.mu)
 
 
@@ -317,7 +318,8 @@ def test_least_regret_within_the_bounds_of_the_weights(seed, has_sensitivity):
     run = list(
         cpirl(forward, expert, mode="minimise", min_weight=low, rng=rng, probe=1e-4, max_solves=40)
     )
-    assert run[-1].status in (Status.CONVERGED, Status.GAP_CLOSED)
+    assert w_E.min() < low and run[-1].status is Status.NOT_OPTIMAL
+    assert run[-1].bracket.lower > 0.0, "none of the weights that count explains it"
     assert all(i.estimate.min() >= low - 1e-12 for i in run)
     assert all(i.w.min() >= low - 1e-12 for i in run if i.rule is not Rule.PROBE)
     best = minimize(

@@ -19,6 +19,7 @@ from recordings import (
 )
 
 from walking_irl.cpirl.loop import cpirl
+from walking_irl.cpirl.probes import Probing
 from walking_irl.cpirl.summary import summarise
 from walking_irl.domains.contract import Truth
 from walking_irl.domains.lqr import LQR
@@ -130,7 +131,8 @@ def test_how_sure_a_recovery_is_is_read_back_and_told(recorded: Recording) -> No
     assert found["units"] == [f"m^{j}" for j in range(6)]
     assert found["rule"] == expected.rule and expected.rule in recorded.summary
     last = iterations[-1]
-    np.testing.assert_allclose(found["bracket"], [-last.certificate, last.best_regret])
+    np.testing.assert_allclose(found["bracket"], last.bracket)
+    assert found["how_sure"] == expected.how_sure and expected.how_sure in recorded.summary
     assert found["volume_ratio"] == pytest.approx(expected.volume_ratio)
     assert 0.0 < found["volume_ratio"] < 1.0
     assert f"leave {expected.volume_ratio:.1e} of the volume of all" in recorded.summary
@@ -155,6 +157,19 @@ def test_weakest_direction_and_noise_are_told_where_they_are_known(tmp_path: Pat
     assert found["weakest"] == expected.weakest and f"**{expected.weakest}**" in text
     np.testing.assert_allclose(found["noise"], expert.error)
     assert "known from 7 trajectories to within 2 % each" in text
+
+
+def test_half_widths_are_told_by_cause(tmp_path: Path) -> None:
+    problem, rng = LQR(3), np.random.default_rng(0)
+    expert = problem.expert(np.array([0.2, 0.3, 0.5]), rng)
+    iterations = list(cpirl(problem.forward, expert, rng=rng, probe=Probing()))
+    with Recorder(tmp_path / "a.rrd", Experiment("lqr", problem.objectives, expert)) as recorder:
+        for it in iterations:
+            recorder.iteration(it)
+    found, text = inspect_recording(tmp_path / "a.rrd"), Recording(tmp_path / "a.rrd").summary
+    for part in ("from_noise", "from_gap", "from_solver"):
+        np.testing.assert_allclose(found[part], getattr(iterations[-1].certainty, part))
+    assert found["how_sure"].startswith("from the expert's possible") and found["how_sure"] in text
 
 
 def test_summary_tells_true_and_recovered_weights(recorded: Recording) -> None:

@@ -10,7 +10,7 @@ from walking_irl.types import Rule
 @pytest.fixture(autouse=True)
 def without_probes(monkeypatch):
     """They are beyond the budget, and cost most."""
-    monkeypatch.setattr(session, "Probing", lambda level, executor: None)
+    monkeypatch.setattr(session, "Probing", lambda **_: None)
 
 
 @pytest.mark.parametrize(

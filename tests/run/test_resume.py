@@ -71,7 +71,7 @@ def test_the_checkpoint_is_whole_after_every_solve(call, tmp_path, monkeypatch):
     known = []
 
     def look(it, report):
-        known.append(len(load_checkpoint(tmp_path / "walking.checkpoint.npz").answers))
+        known.append(len(load_checkpoint(tmp_path / "lqr.checkpoint.npz").answers))
         if len(known) == 4:
             raise KeyboardInterrupt
         return "line"
@@ -79,7 +79,7 @@ def test_the_checkpoint_is_whole_after_every_solve(call, tmp_path, monkeypatch):
     monkeypatch.setattr(terminal, "progress_line", look)
     code, out, _ = call("--domain", "lqr")
     assert code == 130 and known == [1, 2, 3, 4]
-    assert "recover --resume walking.checkpoint.npz" in out
+    assert "recover --resume lqr.checkpoint.npz" in out
 
 
 def test_known_answers_are_not_solved_again():
@@ -124,7 +124,7 @@ def test_a_run_survives_the_disk(tmp_path, domain):
 @pytest.fixture
 def checkpoint(call, tmp_path):
     call("--domain", "lqr", "--max-solves", 2)
-    return tmp_path / "walking.checkpoint.npz"
+    return tmp_path / "lqr.checkpoint.npz"
 
 
 def complaint(call, *argv):
@@ -140,7 +140,7 @@ def test_a_missing_checkpoint(call):
 @pytest.mark.parametrize("content", [b"", b"no checkpoint", b"PK\x03\x04" + bytes(40)])
 def test_an_unreadable_checkpoint(call, tmp_path, content):
     (tmp_path / "bad.npz").write_bytes(content)
-    assert "not a readable run" in complaint(call, "--resume", "bad.npz")
+    assert "not a readable .npz" in complaint(call, "--resume", "bad.npz")
 
 
 def test_half_a_checkpoint(call, checkpoint, tmp_path):

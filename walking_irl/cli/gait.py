@@ -106,9 +106,14 @@ def _record_walk(path: Path, domain: Any, found: Any, seconds: float, w: Array) 
 
     policy = tracking_policy(domain.walker, found, substeps=2)
     walked = rollout(domain.walker, policy, seconds=seconds)
-    rows = [f"| {o.name} | {v:.4f} |" for o, v in zip(domain.objectives, w, strict=True)]
-    text = "\n".join(["| objective | weight |", "|---|---|", *rows])
-    record_motion(path, WalkerView(domain.walker.model), walked, title=domain.name, text=text)
+    view, names = WalkerView(domain.walker.model), [o.name for o in domain.objectives]
+    weights = dict(zip(names, w.tolist(), strict=True))
+    rows = [f"| {name} | {v:.4f} |" for name, v in weights.items()]
+    pace = f"{found.speed:.2f} m/s, {60 / found.half_period:.0f} steps per minute"
+    text = "\n".join([f"{pace}\n", "| objective | weight |", "|---|---|", *rows])
+    record_motion(
+        path, view, walked, title=domain.name, text=text, weights=weights, plots=view.plots()
+    )
 
 
 def _show_gait(content: dict[str, Any], console: Console) -> None:

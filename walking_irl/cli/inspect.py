@@ -30,14 +30,17 @@ def run(args: argparse.Namespace, console: Console) -> int:
     content = inspect_recording(args.file)
     if args.json is not None:
         write_json(args.json, content)
-    console.print(_table_of_recording(content))
+    if content["objectives"]:
+        console.print(_table_of_recording(content))
     for key in (
         *("domain", "seed", "centre", "mode", "status", "ending", "rule", "certificate"),
-        *("bracket", "volume_ratio", "condition_number", "weakest", "gauge", "noise"),
+        *("bracket", "how_sure", "volume_ratio", "condition_number", "weakest", "gauge", "noise"),
     ):
         if content[key] is not None:
             console.print(f"{key.replace('_', ' ')}: {escape(_short(content[key]))}")
-    console.print(f"iterations: {content['iterations']}, frames: {content['frames']}")
+    if content["iterations"] is not None:
+        console.print(f"iterations: {content['iterations']}")
+    console.print(f"frames: {content['frames']}")
     console.print(f"timelines: {', '.join(content['timelines'])}")
     console.print(f"{len(content['entities'])} entities:")
     for entity in content["entities"]:
@@ -46,19 +49,23 @@ def run(args: argparse.Namespace, console: Console) -> int:
 
 
 def _table_of_recording(content: dict[str, Any]) -> Table:
+    """Weights by objective; a recording of one motion alone has no more of them."""
+    if content["intervals"] is None:
+        table = Table("objective", "weight")
+        for name, w in zip(content["objectives"] or [], content["w"] or [], strict=False):
+            table.add_row(str(name), f"{w:.4f}")
+        return table
     table = Table("objective", "ground truth", "recovered", "interval", "per raw unit")
     truth, found, bounds = content["w_expert"], content["w"], content["intervals"]
-    for j, name in enumerate(content["objectives"] or []):
+    physical = content["physical_intervals"]
+    for j, name in enumerate(content["objectives"]):
+        unit = per_unit(physical[j], content["units"][j]).replace(" per ", "\nper ")
         table.add_row(
             str(name),
             "unknown" if truth is None else f"{truth[j]:.4f}",
-            "-" if found is None else f"{found[j]:.4f}",
-            "-" if bounds is None else f"{bounds[j][0]:.4f} .. {bounds[j][1]:.4f}",
-            "-"
-            if content["physical_intervals"] is None
-            else per_unit(content["physical_intervals"][j], content["units"][j]).replace(
-                " per ", "\nper "
-            ),
+            f"{found[j]:.4f}",
+            f"{bounds[j][0]:.4f} .. {bounds[j][1]:.4f}",
+            unit,
         )
     return table
 

@@ -16,11 +16,14 @@ import sys
 from collections.abc import Sequence
 from concurrent.futures import BrokenExecutor
 from importlib import import_module
-from typing import NoReturn
+from itertools import pairwise
+from typing import IO, NoReturn, cast
 
 from walking_irl import __version__
 from walking_irl.cli import BAD_INPUT, FAILED, INTERRUPTED
+from walking_irl.cli.output import Output
 from walking_irl.errors import EmptyPolyhedronError, InvalidInputError, WalkingIRLError
+from walking_irl.workers import interrupts_raised
 
 COMMANDS = (
     "recover",
@@ -78,12 +81,10 @@ def build_parser() -> argparse.ArgumentParser:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command; returns the exit code."""
     try:
-        return _run(_joined(sys.argv[1:] if argv is None else argv))
+        with interrupts_raised():
+            return _run(_joined(sys.argv[1:] if argv is None else argv))
     except KeyboardInterrupt:
         return _complain("interrupted before there was a result", INTERRUPTED)
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # the reader of our output has left
-        return FAILED
     except InvalidInputError as error:
         return _complain(f"error: {error}", BAD_INPUT)
     except EmptyPolyhedronError as error:
@@ -97,10 +98,16 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(argv: Sequence[str]) -> int:
+    for before, word in pairwise(["", *argv]):
+        if not word or (word[:2] == "--" and word.endswith("=")):
+            what = word.rstrip("=") or (before if before[:2] == "--" else "an argument")
+            raise InvalidInputError(f"{what} is empty; is a variable of the shell not set?")
     args = build_parser().parse_args(argv)
     from rich.console import Console
 
-    return int(args.run(args, Console(highlight=False, soft_wrap=True)))
+    out = cast(IO[str], Output(sys.stdout))
+    console = Console(file=out, highlight=False, soft_wrap=True)
+    return int(args.run(args, console))
 
 
 def _joined(argv: Sequence[str]) -> list[str]:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import fields, replace
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -19,12 +21,12 @@ from walking_irl.errors import InvalidInputError
 from walking_irl.files import check_ending, check_outputs, write_json
 from walking_irl.geometry.centres import CENTRES
 from walking_irl.run import session
-from walking_irl.run.checkpoint import load_checkpoint
+from walking_irl.run.checkpoint import Checkpoint, load_checkpoint
+from walking_irl.run.report import Report
 from walking_irl.run.setup import Setup
 from walking_irl.types import MODES
-from walking_irl.workers import workers
+from walking_irl.workers import interrupts_held, workers
 
-RECORDING = Path("walking.rrd")
 ALSO_WHEN_RESUMED = ("record", "checkpoint", "max_solves")
 """What a resumed run may be told anew."""
 
@@ -89,9 +91,9 @@ def _add_outputs(out: Any) -> None:
     out.add_argument(
         "--record",
         type=Path,
-        default=RECORDING,
         metavar="FILE.rrd",
-        help="where the recording goes (%(default)s); the expert's rollouts go beside it",
+        help="where the recording goes (walking.rrd, or as the domain is called; an earlier one is "
+        "kept under a number); the expert's rollouts go beside it",
     )
     out.add_argument("--no-record", action="store_true", help="write no recording")
     out.add_argument(
@@ -148,24 +150,19 @@ def run(args: argparse.Namespace, console: Console) -> int:
     if setup.record is not None and domain.has_trajectories:
         rollouts = setup.record.with_suffix(".npz")
     _check_files(setup, rollouts, args)
+    if args.record is None and before is None:
+        _keep_earlier([setup.record, rollouts, setup.checkpoint], console)
     if not args.quiet:
         source = "solving for" if before is None else f"{args.resume} knows"
         console.print(f"{setup.domain}: {source} the expert ...")
     n_known = 0 if before is None else len(before.answers)
     terminal = Terminal(console, rollouts, n_known, args.quiet)
-    with workers() as executor, terminal:
-        report = session.run(
-            setup,
-            resumed=before,
-            executor=executor,
-            on_expert=terminal.expert,
-            on_iteration=terminal.iteration,
-            on_step=terminal.step,
-        )
+    report = _recovered(setup, before, terminal, domain.defaults.needs_workers)
     failure = report.failed_write
     if args.json is not None:  # before the terminal, whose reader may leave
         try:
-            write_json(args.json, report.to_json())
+            with interrupts_held():
+                write_json(args.json, report.to_json())
         except InvalidInputError as error:
             failure = failure or error
     show_report(report, console, terminal.rollouts_written)
@@ -174,6 +171,27 @@ def run(args: argparse.Namespace, console: Console) -> int:
     if report.was_interrupted:
         return INTERRUPTED
     return DONE if report.is_success else FAILED
+
+
+def _recovered(
+    setup: Setup, before: Checkpoint | None, terminal: Terminal, needs_workers: bool
+) -> Report:
+    """The run; Ctrl-C while its workers end comes too late to take its result away."""
+    report = None
+    try:
+        with workers() if needs_workers else nullcontext() as executor, terminal:
+            report = session.run(
+                setup,
+                resumed=before,
+                executor=executor,
+                on_expert=terminal.expert,
+                on_iteration=terminal.iteration,
+                on_step=terminal.step,
+            )
+    except KeyboardInterrupt:
+        if report is None:
+            raise
+    return report
 
 
 def _rename_archive(args: argparse.Namespace, console: Console) -> None:
@@ -193,6 +211,20 @@ def _check_files(setup: Setup, rollouts: Path | None, args: argparse.Namespace) 
     check_outputs([*outputs, setup.checkpoint], inputs=[setup.demonstration])
     if args.resume is not None:  # its checkpoint goes on in the same file
         check_outputs(outputs, inputs=[args.resume])
+
+
+def _keep_earlier(paths: Sequence[Path | None], console: Console) -> None:
+    """Number an earlier run's files of the default names, and say so in one line."""
+    there = [path for path in paths if path is not None and path.is_file()]
+    if there:
+        numbers = (n for n in count(1) if not any(_numbered(p, n).exists() for p in there))
+        kept = [path.rename(_numbered(path, n)) for n in [next(numbers)] for path in there]
+        console.print(f"an earlier run is kept: {', '.join(map(str, kept))}")
+
+
+def _numbered(path: Path, n: int) -> Path:
+    stem, ending = path.name.split(".", 1)
+    return path.with_name(f"{stem}.{n}.{ending}")
 
 
 def _asked(args: argparse.Namespace) -> dict[str, Any]:
@@ -217,7 +249,9 @@ def _setup(args: argparse.Namespace, before: Setup | None) -> Setup:
     """The setup of a new run, or of one that goes on with what it began with."""
     given = _asked(args)
     options = given.pop("options")
-    given["record"] = None if args.no_record else args.record
+    name = before.domain if before is not None else given.get("domain", Setup.domain)
+    default = Path(f"{load(name).defaults.files or name}.rrd")
+    given["record"] = None if args.no_record else args.record or default
     if before is not None:
         return _resumed(given, options, before, args)
     if given.get("expert") == "suboptimal":

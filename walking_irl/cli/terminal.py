@@ -18,11 +18,20 @@ from rich.progress import (
 from rich.table import Table
 
 from walking_irl.cli.weights import show_weights
-from walking_irl.cpirl.summary import Summary, noise_level, per_unit, volume_left
+from walking_irl.cpirl.summary import (
+    Summary,
+    estimate_name,
+    noise_level,
+    per_unit,
+    volume_left,
+)
 from walking_irl.files import write_arrays
 from walking_irl.run.problem import Problem
 from walking_irl.run.report import Report, progress_line
 from walking_irl.types import Iteration, Rule
+
+NO_GAIN = 1e-6
+"""Share of the return by which a solver may beat another by chance."""
 
 
 class Terminal:
@@ -107,9 +116,7 @@ def show_report(report: Report, console: Console, rollouts: Path | None) -> None
         console.print(
             f"L1 error {report.l1_error:.5f}; ground-truth weights {inside} the intervals"
         )
-    loss = report.relative_loss(report.recovered_mu)
-    if loss is not None:
-        console.print(f"loss of the recovered policy, ground-truth weights: {100 * loss:.5f} %")
+    _show_loss(report, console)
     seconds = ", ".join(f"{k} {v:.1f}" for k, v in report.seconds.items())
     console.print(f"{out['forward_solves']} forward solves + {out['probe_solves']} probes")
     console.print(f"seconds: {seconds}")
@@ -122,13 +129,30 @@ def show_report(report: Report, console: Console, rollouts: Path | None) -> None
         console.print(f"to go on from here: walking-irl recover --resume {path} --max-solves N")
 
 
+def _show_loss(report: Report, console: Console) -> None:
+    """What the recovered policy loses, and whether the learner knows a better one than the expert.
+
+    Both under the ground-truth weights.
+    """
+    loss, gain = report.relative_loss(report.recovered_mu), report.beaten_by
+    if loss is not None:
+        console.print(
+            f"loss of the recovered policy, ground-truth weights: {100 * max(loss, 0.0):.5f} %"
+        )
+    if gain is not None and gain > NO_GAIN:
+        console.print(
+            f"a policy that the learner found is {100 * gain:.2g} % better than the expert's own "
+            "under the ground-truth weights: the expert is not optimal for them"
+        )
+
+
 def _weights_table(report: Report) -> Table:
     table = Table(title=report.problem.domain.question)
     table.add_column("objective")
     truth = report.w_expert
     if truth is not None:
         table.add_column("ground truth", justify="right")
-    table.add_column("recovered", justify="right")
+    table.add_column(estimate_name(report.summary), justify="right")
     table.add_column("interval", justify="right")
     for j, objective in enumerate(report.objectives):
         low, high = report.last.intervals[j]

@@ -30,6 +30,8 @@ _EXACT_STEP, _ESTIMATED_STEP = 2e-4, 1e-3
 """Newton step (L1) that counts as none."""
 _BEATEN = -1e-8
 """Certificate, relative to the expert's features, that proves that a mixture beats it."""
+_NEARLY = 1e-3
+"""Least relative regret of an expert whose weights are sought although a policy dominates it."""
 _CLOSED = 3.0
 """Ratio of the ends of min f's bracket, the lower above 0, below which there is little to learn:
 half widths, which follow its root, would become narrower by sqrt(3) at most."""
@@ -93,14 +95,21 @@ class Matched:
 
 @dataclass(frozen=True)
 class Dominated:
-    """One policy that was queried is at least as good in every feature, and better in one."""
+    """One policy that was queried is at least as good in every feature, and better in one.
+
+    Near the minimum of the regret of a nearly optimal expert that is no answer: there the best
+    policy dominates it by as little as it is sub-optimal, and its weights are sought further.
+    """
 
     tol: float
 
     def __call__(self, outlook: Outlook) -> Ending | None:
         """See :class:`Endings`; of the policies only evaluated none is kept."""
-        d = outlook.bundle.differences[: len(outlook.bundle.responses)]
-        is_above = (d >= 0.0).all(axis=1) & (d.max(axis=1) > self.tol * outlook.bundle.unit)
+        bundle = outlook.bundle
+        if outlook.model is not None and bundle.relative_regrets.min() <= _NEARLY:
+            return None
+        d = bundle.differences[: len(bundle.responses)]
+        is_above = (d >= 0.0).all(axis=1) & (d.max(axis=1) > self.tol * bundle.unit)
         return Ending(Status.DOMINATED) if is_above.any() else None
 
 
@@ -238,8 +247,8 @@ def told_true(decision: Decision, outlook: Outlook, tol: float) -> Decision:
     """The ending in the light of what is known of min f; a run that goes on is not asked.
 
     Where the bracket has closed nothing is left to ask, whatever ended the run. Modes that take
-    min f to be 0 are contradicted by an exact expert whose lower bound is above what it is granted;
-    one above the tolerance says that the expert is not exactly optimal.
+    min f to be 0 are contradicted by an exact expert whose lower bound is above what it is granted.
+    Otherwise one above the tolerance says that the expert is not exactly optimal.
 
     Args:
         decision: What is believed.
@@ -253,7 +262,6 @@ def told_true(decision: Decision, outlook: Outlook, tol: float) -> Decision:
     bracket = bracket_of(bundle, decision.estimate)
     if takes_zero and bundle.is_exact and bracket.lower > max(bundle.expert.suboptimality, none):
         return decision._replace(status=Status.CONTRADICTED)
-    is_done = takes_zero if status.has_weights else bracket.is_closed(_CLOSED)
-    if is_done and bracket.lower > none:
+    if bracket.lower > none and (status.has_weights or bracket.is_closed(_CLOSED)):
         return decision._replace(status=Status.NOT_OPTIMAL)
     return decision

@@ -110,6 +110,11 @@ def summarise(
     )
 
 
+def estimate_name(found: Summary) -> str:
+    """What the weights of a run are to be called: recovered, where it ended with some."""
+    return "recovered" if found.status.has_weights else "best so far"
+
+
 def per_unit(interval: Sequence[float], unit: str) -> str:
     """An interval of a weight per raw unit of its cost, in words.
 
@@ -148,7 +153,7 @@ def _rule(iterations: Sequence[Iteration], has_model: bool) -> str:
         return "the query of the least regret"
     if has_model:
         return "the minimum of the regret's quadratic model (a Newton step)"
-    if last.status is Status.GAP_CLOSED:
+    if last.status in (Status.GAP_CLOSED, Status.NOT_OPTIMAL):
         return "where the policies found leave the least regret"
     return "the centre of the weights that are left"
 

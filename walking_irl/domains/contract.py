@@ -43,6 +43,10 @@ class Defaults(NamedTuple):
     """Budget of forward solves, probes left aside; what is cheap to solve may be solved often."""
     min_weight: float = 0.0
     """The learner's lower bound of every weight."""
+    needs_workers: bool = False
+    """Whether a forward solve takes longer than to start a process."""
+    files: str = ""
+    """What a run's files are called unless a user names them; as the domain, where empty."""
 
 
 @dataclass(frozen=True)

@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
 import rerun.blueprint as rrb
 
 from walking_irl.recording import style
 from walking_irl.recording.experiment import Experiment
+from walking_irl.recording.interval_bars import BARS, bounds
 from walking_irl.recording.panels import Panel, panels
 from walking_irl.recording.progress_view import (
-    BARS,
     FIGURES,
-    ROW,
+    FLOOR,
     distance_path,
     feature_path,
     share_path,
     weight_path,
 )
 from walking_irl.recording.views.view import WorldView
+
+MOST_PLOTS = 4
+"""Curves of a world that have a plot each."""
 
 
 def blueprint(experiment: Experiment, world: WorldView[Any] | None) -> rrb.Blueprint:
@@ -41,12 +47,12 @@ def blueprint(experiment: Experiment, world: WorldView[Any] | None) -> rrb.Bluep
             *([] if world is None else curves),
             active_tab=0,
         ),
-        _certificate(),
+        _certificate(experiment),
         rrb.Tabs(
             rrb.TextDocumentView(origin="/summary", name="What to look at"),
             rrb.TextLogView(origin="/log", name="Log"),
             _plots("Features", [f"/{feature_path(name)}" for name in experiment.names]),
-            *([] if world is None else [_plots(world.curves_name, world.curves())]),
+            *([] if world is None else [_each(world.curves_name, world.curves())]),
             active_tab=0,
         ),
         column_shares=[1.15, 1.0, 1.0],
@@ -56,10 +62,12 @@ def blueprint(experiment: Experiment, world: WorldView[Any] | None) -> rrb.Bluep
     return _window(rrb.Vertical(*rows, row_shares=[1.75, 1.0][: len(rows)]))
 
 
-def motion_blueprint(world: WorldView[Any]) -> rrb.Blueprint:
-    """One motion alone: the world, and beside it the text and the joints."""
+def motion_blueprint(world: WorldView[Any], plots: Mapping[str, Sequence[str]]) -> rrb.Blueprint:
+    """One motion alone: the world, and beside it the text, further plots and the joints."""
     text = rrb.TextDocumentView(origin="/summary", name="Summary")
-    side = rrb.Vertical(text, _plots(world.curves_name, world.curves()), row_shares=[1.0, 1.0])
+    further = [_plots(name, list(curves)) for name, curves in plots.items()]
+    curves = [*further, _plots(world.curves_name, world.curves())]
+    side = rrb.Vertical(text, *curves, row_shares=[1.3, *(1.0 for _ in curves)])
     return _window(rrb.Horizontal(world.view(), side, column_shares=[1.7, 1.0]))
 
 
@@ -99,12 +107,12 @@ def _shadow(panel: Panel, n_panels: int, is_wide: bool) -> rrb.View:
 
 
 def _bars(experiment: Experiment) -> rrb.View:
-    height = ROW * len(experiment.objectives)
+    x_range, y_range = bounds(len(experiment.objectives))
     return rrb.Spatial2DView(
         origin=f"/{BARS}",
         name="Intervals of the weights",
         background=style.PAPER,
-        visual_bounds=rrb.VisualBounds2D(x_range=(-0.27, 1.04), y_range=(-0.07, 1.12 * height)),
+        visual_bounds=rrb.VisualBounds2D(x_range=x_range, y_range=y_range),
     )
 
 
@@ -121,13 +129,17 @@ def _history(experiment: Experiment) -> rrb.Container:
     return rrb.Grid(*plots, grid_columns=3, name="Intervals over time")
 
 
-def _certificate() -> rrb.View:
+def _certificate(experiment: Experiment) -> rrb.View:
+    """Figures that fall; the legend stands where they come last."""
+    largest = float(np.abs(experiment.expert.mu).sum())
+    top = 0.3 + max(0.0, math.log10(max(largest, 1.0)))
     return rrb.TimeSeriesView(
         origin="/cpirl/log10",
         contents=[f"/cpirl/log10/{key}" for key in FIGURES if key != "regret"],
-        name="Certificate and regret (log10)",
+        name="Powers of ten: certificate, regret, loss, volume",
         axis_x=_whole_run(),
-        plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
+        axis_y=rrb.ScalarAxis(range=(math.log10(FLOOR), top)),
+        plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftBottom),
         background=rrb.archetypes.PlotBackground(color=style.PAPER, show_grid=False),
     )
 
@@ -141,6 +153,13 @@ def _plots(name: str, curves: list[str]) -> rrb.View:
         background=rrb.archetypes.PlotBackground(color=style.PAPER, show_grid=False),
         plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
     )
+
+
+def _each(name: str, curves: list[str]) -> rrb.View | rrb.Container:
+    """A plot a curve, which shows learner and expert; many share one."""
+    if len(curves) > MOST_PLOTS:
+        return _plots(name, curves)
+    return rrb.Vertical(*(_plots(curve.rsplit("/", 1)[-1], [curve]) for curve in curves), name=name)
 
 
 def _others(experiment: Experiment) -> list[rrb.View]:

@@ -12,6 +12,8 @@ from walking_irl.arrays import Array
 
 COPLANAR = 1e-6
 """Faces whose unit normals differ by less are one face (after scaling to unit size)."""
+CREASE = 0.25
+"""The same for pictures of round sets, whose hundreds of edges would hide what is inside."""
 FLAT = 1e-7
 """A shadow thinner than this share of its length is drawn as flat."""
 
@@ -24,11 +26,13 @@ class Hull(NamedTuple):
     triangles: NDArray[np.uint32]
     """Indices into ``points``, outward, shape (m, 3); empty for a segment or a point."""
     edges: Array
-    """End points of the true edges, shape (e, 2, 3)."""
+    """End points of the true edges, or of the sharper ones, shape (e, 2, 3)."""
 
 
-def hull(points: Array) -> Hull:
+def hull(points: Array, crease: float = COPLANAR) -> Hull:
     """Convex hull of 3-D points, shape (n, 3), of any extent and any dimension 0..3.
+
+    Edges are those whose faces' unit normals differ by more than ``crease``.
 
     >>> cube = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
     >>> len(hull(cube).edges), len(hull(1e-9 * cube).edges), len(hull(cube[:4]).edges)
@@ -42,13 +46,13 @@ def hull(points: Array) -> Hull:
     _, extent, axes = np.linalg.svd(unit, full_matrices=False)
     rank = int(np.sum(extent > FLAT * extent[0]))
     try:
-        body = {3: _solid, 2: _polygon, 1: _segment}[rank](unit, axes)
+        body = _solid(unit, crease) if rank == 3 else {2: _polygon, 1: _segment}[rank](unit, axes)
     except QhullError:  # too thin for Qhull after all: its longest extent is what can be seen
         body = _segment(unit, axes)
     return Hull(middle + size * body.points, body.triangles, middle + size * body.edges)
 
 
-def _solid(unit: Array, axes: Array) -> Hull:
+def _solid(unit: Array, crease: float) -> Hull:
     qhull = ConvexHull(unit)
     triangles = qhull.simplices.copy()
     a, b, c = (unit[triangles[:, i]] for i in range(3))
@@ -61,7 +65,7 @@ def _solid(unit: Array, axes: Array) -> Hull:
             zip(qhull.simplices, qhull.neighbors, strict=True)
         )
         for j, n in enumerate(neighbours)
-        if n > i and np.linalg.norm(normals[i] - normals[n]) > COPLANAR
+        if n > i and np.linalg.norm(normals[i] - normals[n]) > crease
     ]
     return _compact(unit, triangles, np.array(edges).reshape(-1, 2))
 

@@ -38,13 +38,13 @@ class Lens:
         return seen
 
 
-def magnification(extent: float) -> float:
-    """Largest round factor that keeps ``extent`` within the lens, at least 1.
+def magnification(extent: float, radius: float = LENS_RADIUS) -> float:
+    """Largest round factor that keeps ``extent`` within a lens, at least 1.
 
     >>> magnification(0.03), magnification(3.0), magnification(1e-5)
     (10.0, 1.0, 30000.0)
     """
-    largest = LENS_RADIUS / max(extent, 1e-9)
+    largest = radius / max(extent, 1e-9)
     if largest <= 1.0:
         return 1.0
     power = 10.0 ** np.floor(np.log10(largest))

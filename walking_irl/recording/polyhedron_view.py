@@ -20,14 +20,14 @@ from walking_irl.errors import EmptyPolyhedronError
 from walking_irl.recording import style
 from walking_irl.recording.drawing import text_3d
 from walking_irl.recording.experiment import Clock, Experiment, Other
-from walking_irl.recording.hulls import Hull, faces_lost, hull
+from walking_irl.recording.hulls import CREASE, Hull, faces_lost, hull
 from walking_irl.recording.lens import LENS_RADIUS, Lens, lens_of, log_lens, pictures
 from walking_irl.recording.panels import Panel, panels
 from walking_irl.types import Iteration
 
 CLEAR_EDGES, MOST_EDGES = 40, 90
 """Edges from which lines become thinner, and the most that are drawn."""
-SET_ALPHA, CUT_ALPHA, CUT_EDGE = 0.28, 0.42, 2.6
+SET_ALPHA, CUT_ALPHA, CUT_EDGE = 0.2, 0.42, 2.6
 """Opacity of the set and of what the newest cut took away, and width of its edges, at first."""
 THIN = 0.4
 """Share of these opacities where further points inside must keep their colours."""
@@ -39,13 +39,25 @@ KEY_SOLID = ((0.95, -0.18, 0.95), (0.0, 0.0, -0.14))
 
 
 class _Point(NamedTuple):
-    """A point among the weights."""
+    """A point among the weights: a dot, or lines about it, which hide nothing behind them."""
 
     name: str
     w: Array
     colour: style.Colour
-    size: float
-    """Radius [points of the screen]."""
+    size: float = 6.0
+    """Radius of a dot [points of the screen]."""
+    lines: Array | None = None
+    """Ends of lines about it, shape (n, 2, 3)."""
+
+
+CROSS = 0.055 * np.stack([np.eye(3), -np.eye(3)], axis=1)
+"""Three lines along the axes: the ground truth."""
+DIAMOND = 0.028 * np.array(
+    [[a * u, b * v] for u, v in combinations(np.eye(3), 2) for a in (1, -1) for b in (1, -1)]
+)
+"""Edges of an octahedron: the estimate."""
+LINE = 1.8
+"""Width of these lines [points of the screen]."""
 
 
 class PolyhedronView:
@@ -79,21 +91,28 @@ class PolyhedronView:
         except EmptyPolyhedronError:
             return
         for panel in self.panels:
-            after = hull(panel.project(vertices))
+            after = hull(panel.project(vertices), CREASE)
             before = self._before.get(panel.path, after)
             self._log_panel(stream, clock, panel, self._points(it, others), before, after)
             self._before[panel.path] = after
 
+    def log_answer(self, stream: rr.RecordingStream, clock: Clock) -> None:
+        """The last query leaves; the estimate, which is the answer, stays."""
+        clock.set(stream)
+        for panel in self.panels:
+            for root in (panel.path, f"{panel.path}/lens"):
+                stream.log(f"{root}/query", rr.Clear(recursive=False))
+
     def _points(self, it: Iteration, others: Sequence[Other]) -> list[_Point]:
         points = [
-            _Point("query", it.w, style.LEARNER, 4.5),
-            _Point("estimate", it.estimate, style.ESTIMATE, 5.0),
+            _Point("query", it.w, style.LEARNER, 4.0),
+            _Point("estimate", it.estimate, style.ESTIMATE, lines=DIAMOND),
         ]
         if self._others:
             shown = zip(self._others, others, style.OTHERS, strict=False)
             points = [_Point(other_path(name), o.w, colour, 5.5) for name, o, colour in shown]
         if self._w_expert is not None:
-            points.append(_Point("truth", self._w_expert, style.EXPERT, 6.0))
+            points.append(_Point("truth", self._w_expert, style.EXPERT, lines=CROSS))
         return points
 
     def _log_panel(
@@ -213,9 +232,15 @@ def _longest(edges: Array) -> Array:
 def _log_point(
     stream: rr.RecordingStream, root: str, point: _Point, x: Array, is_seen: bool
 ) -> None:
-    at = [x] if is_seen else np.empty((0, 3))
-    radii = rr.Radius.ui_points([point.size])
-    stream.log(f"{root}/{point.name}", rr.Points3D(at, colors=[point.colour], radii=radii))
+    shape: rr.Points3D | rr.LineStrips3D
+    if point.lines is None:
+        radii = rr.Radius.ui_points([point.size])
+        shape = rr.Points3D([x] if is_seen else [], colors=[point.colour], radii=radii)
+    else:
+        strips = x + point.lines if is_seen else np.empty((0, 2, 3))
+        radii = rr.Radius.ui_points([LINE / 2])
+        shape = rr.LineStrips3D(strips, colors=[point.colour], radii=radii)
+    stream.log(f"{root}/{point.name}", shape)
 
 
 def _mesh(

@@ -8,24 +8,22 @@ from collections.abc import Sequence
 import numpy as np
 import rerun as rr
 
-from walking_irl.arrays import Array
 from walking_irl.recording import style
-from walking_irl.recording.drawing import text_2d
 from walking_irl.recording.experiment import Clock, Experiment, Other
-from walking_irl.types import Iteration
+from walking_irl.recording.interval_bars import IntervalBars
+from walking_irl.types import Iteration, Rule
 
-ROW = 0.105
-"""Height of an objective's row among the interval bars, in units of the axis 0..1."""
-BARS = "polyhedron/intervals"
 FIGURES = {
     "certificate": ("certificate", style.ESTIMATE),
     "best_regret": ("best regret", style.LEARNER),
     "regret": ("regret", style.FRAME),
-    "loss": ("loss under the ground-truth weights", style.EXPERT),
+    "loss": ("loss, ground truth", style.EXPERT),
     "volume_ratio": ("volume left", style.POLYHEDRON),
 }
 FLOOR = 1e-7
-"""Smallest figure in the logarithmic plot."""
+"""Where the logarithmic plot ends; what is smaller leaves it at the bottom."""
+NOTHING = 1e-30
+"""Drawn in the place of zero."""
 
 
 class ProgressView:
@@ -35,6 +33,7 @@ class ProgressView:
         self._experiment = experiment
         self._K = len(experiment.objectives)
         self._whole: float | None = None
+        self._bars = IntervalBars(experiment)
 
     def log_static(self, stream: rr.RecordingStream) -> None:
         """Log names and styles of the curves, and the axes of the bars."""
@@ -55,7 +54,7 @@ class ProgressView:
         for name, colour in zip(self._experiment.others, style.OTHERS, strict=False):
             for path in (distance_path(name), share_path(name)):
                 _log_style(stream, path, [name], [colour], [2.0])
-        self._log_axes(stream)
+        self._bars.log_static(stream)
 
     def log_iteration(
         self, stream: rr.RecordingStream, clock: Clock, it: Iteration, others: Sequence[Other] = ()
@@ -72,15 +71,22 @@ class ProgressView:
         for key, value in self._figures(it).items():
             if value is not None and math.isfinite(value):
                 stream.log(f"cpirl/{key}", rr.Scalars(value))
-                stream.log(f"cpirl/log10/{key}", rr.Scalars(math.log10(max(value, FLOOR))))
+                if key == "loss" and it.rule is Rule.PROBE:
+                    continue  # a probe asks for extreme weights, whose policy is no answer
+                stream.log(f"cpirl/log10/{key}", rr.Scalars(math.log10(max(value, NOTHING))))
         for name, other in zip(e.others, others, strict=True):
             if other.share is not None:
                 stream.log(share_path(name), rr.Scalars(other.share))
             if e.w_expert is not None:
                 distance = float(np.abs(other.w - e.w_expert).sum())
                 stream.log(distance_path(name), rr.Scalars(math.log10(max(distance, FLOOR))))
-        self._log_bars(stream, it)
+        self._bars.log_iteration(stream, it)
         stream.log("log", rr.TextLog(line(it), level=rr.TextLogLevel.INFO))
+
+    def log_answer(self, stream: rr.RecordingStream, clock: Clock) -> None:
+        """From here on the answer is shown, no query."""
+        clock.set(stream)
+        self._bars.log_answer(stream)
 
     def _figures(self, it: Iteration) -> dict[str, float | None]:
         if self._whole is None:
@@ -93,46 +99,6 @@ class ProgressView:
             "volume_ratio": it.polyhedron.volume() / self._whole,
             "loss": None if truth is None else truth.relative_loss(it.response.mu),
         }
-
-    def _log_axes(self, stream: rr.RecordingStream) -> None:
-        y = ROW * np.arange(self._K, dtype=np.float64)
-        rails = [[[0.0, v], [1.0, v]] for v in y]
-        stream.log(
-            f"{BARS}/rails",
-            rr.LineStrips2D(rails, colors=[style.with_alpha(style.FRAME, 0.5)],
-                            radii=rr.Radius.ui_points([0.8])),
-            static=True,
-        )  # fmt: skip
-        names = text_2d(np.c_[np.full(self._K, -0.13), y], self._experiment.names)
-        stream.log(f"{BARS}/names", names, static=True)
-        ticks = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
-        below = np.c_[ticks, np.full(5, y[-1] + 0.6 * ROW)]
-        stream.log(f"{BARS}/ticks", text_2d(below, [f"{t:g}" for t in ticks]), static=True)
-        if self._experiment.w_expert is not None:
-            marks = _upright(self._experiment.w_expert, y, 0.36)
-            stream.log(
-                f"{BARS}/hidden",
-                rr.LineStrips2D(marks, colors=[style.EXPERT], draw_order=30.0,
-                                radii=rr.Radius.ui_points([2.0])),
-                static=True,
-            )  # fmt: skip
-
-    def _log_bars(self, stream: rr.RecordingStream, it: Iteration) -> None:
-        y = ROW * np.arange(self._K, dtype=np.float64)
-        bars = np.stack([np.c_[it.intervals[:, 0], y], np.c_[it.intervals[:, 1], y]], axis=1)
-        thick = rr.Radius.ui_points([5.0])
-        stream.log(
-            f"{BARS}/bars",
-            rr.LineStrips2D(bars, colors=[style.POLYHEDRON], radii=thick, draw_order=10.0),
-        )
-        for name, w, colour, size in (
-            ("query", it.w, style.LEARNER, 6.5),
-            ("estimate", it.estimate, style.ESTIMATE, 4.0),
-        ):
-            dots = rr.Points2D(
-                np.c_[w, y], colors=[colour], radii=rr.Radius.ui_points([size]), draw_order=40.0
-            )
-            stream.log(f"{BARS}/{name}", dots)
 
 
 def weight_path(name: str) -> str:
@@ -174,9 +140,3 @@ def _log_style(
         names=names, colors=colours, widths=widths, interpolation_mode="StepAfter"
     )
     stream.log(path, lines, static=True)
-
-
-def _upright(x: Array, y: Array, height: float) -> Array:
-    """Upright marks at (x, y), shape (n, 2, 2)."""
-    h = height * ROW
-    return np.stack([np.c_[x, y - h], np.c_[x, y + h]], axis=1)

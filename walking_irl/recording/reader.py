@@ -118,7 +118,7 @@ class Recording:
 
 SINGLE = (
     *("domain", "centre", "mode", "seed", "iterations", "ending", "status", "certificate"),
-    *("rule", "volume_ratio", "condition_number", "weakest", "gauge"),
+    *("rule", "how_sure", "volume_ratio", "condition_number", "weakest", "gauge"),
 )
 """Properties that are one value."""
 
@@ -134,7 +134,8 @@ def inspect_recording(path: str | Path) -> dict[str, Any]:
     Returns:
         application_id, domain, objectives, units, centre, mode, seed, w_expert (or None), w, rule,
         intervals (K, 2), physical_intervals (K, 2), status, ending (None for a whole run),
-        certificate, bracket, volume_ratio, condition_number, weakest, gauge, noise, iterations,
+        certificate, bracket, how_sure, half widths by cause (from_noise, from_gap, from_solver;
+        (K,) each), volume_ratio, condition_number, weakest, gauge, noise, iterations,
         frames, entities, timelines, has_blueprint, versions. What is not known is None.
 
     Raises:
@@ -144,8 +145,9 @@ def inspect_recording(path: str | Path) -> dict[str, Any]:
     known = recording.properties
     pairs = {key: known.get(key) for key in ("intervals", "physical_intervals")}
     keys = ("domain", "objectives", "units", "centre", "mode", "seed", "w_expert", "w", "rule",
-            "status", "ending", "certificate", "bracket", "volume_ratio", "condition_number",
-            "weakest", "gauge", "noise", "iterations")  # fmt: skip
+            "status", "ending", "certificate", "bracket", "how_sure", "from_noise", "from_gap",
+            "from_solver", "volume_ratio", "condition_number", "weakest", "gauge", "noise",
+            "iterations")  # fmt: skip
     return {
         "application_id": APPLICATION_ID,
         **{key: known.get(key) for key in keys},
@@ -172,7 +174,7 @@ def _check_file(path: Path) -> Path:
     if not path.exists():
         raise RecordingError(f"there is no recording {path}; check the name")
     if not path.is_file():
-        raise RecordingError(f"expected a recording file, got the directory {path}")
+        raise RecordingError(f"expected a recording file, {path} is a folder or a device")
     try:
         with path.open("rb") as file:
             start = file.read(len(MAGIC))

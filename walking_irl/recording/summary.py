@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from walking_irl.cpirl.summary import Summary, noise_level, per_unit, volume_left
+from walking_irl.cpirl.summary import Summary, estimate_name, noise_level, per_unit, volume_left
 from walking_irl.recording.experiment import Experiment
 from walking_irl.recording.panels import panels
 from walking_irl.types import Status
@@ -47,13 +48,14 @@ def _result(experiment: Experiment, found: Summary) -> str:
         return f"{text} No weights make this expert optimal; {nearest}."
     if experiment.w_expert is not None:
         l1 = float(np.abs(found.w - experiment.w_expert).sum())
-        text += f" Ground-truth weights recovered to {l1:.4f} (sum of absolute errors)."
+        found_how = "recovered to" if found.status.has_weights else "missed by"
+        text += f" Ground-truth weights {found_how} {l1:.4f} (sum of absolute errors)."
     return text
 
 
 def _table(experiment: Experiment, found: Summary) -> str:
     w_expert = experiment.w_expert
-    head = ["objective", "ground truth", "recovered", "interval"]
+    head = ["objective", "ground truth", estimate_name(found), "interval"]
     is_scaled = any(o.scale != 1.0 for o in experiment.objectives)
     if is_scaled:
         head.append("per raw unit")
@@ -100,11 +102,16 @@ def _legend(experiment: Experiment, world: str) -> str:
         (
             f"* **Points**: {', '.join(experiment.others)}, coloured as their curves are"
             if experiment.others
-            else "* **Blue** query, **green** estimate"
+            else "* **Blue dot** query, **green diamond** estimate"
         )
-        + (", **red** ground truth." if experiment.w_expert is not None else "."),
+        + (", **red cross** ground truth." if experiment.w_expert is not None else "."),
+        "* **Intervals**: what a weight may be, given everything that was seen. They are no "
+        "confidence intervals about an estimate. Right of them the same, magnified.",
         "* **Certificate**: no matter which weights are true, a mixture of the policies found "
-        "loses at most this much.",
+        "loses at most this much. It and the best *regret* bound the same loss from both sides, in "
+        "the unit of the weighed objectives. What is below 1e-7 leaves the plot.",
+        "* At the end **probes** ask for the extreme weights of each interval, so that the query "
+        "jumps; the loss is drawn of the queries before. The last frames show the answer.",
     ]
     return "\n".join(text for text in lines if text)
 
@@ -139,4 +146,18 @@ def properties(experiment: Experiment, found: Summary | None, ending: str | None
             "weakest": found.weakest,
             "gauge": found.gauge,
         }
+    if found is not None and found.certainty is not None:
+        for part in ("from_noise", "from_gap", "from_solver"):
+            known[part] = getattr(found.certainty, part)
     return {key: value for key, value in known.items() if value is not None}
+
+
+def motion_properties(name: str, weights: Mapping[str, float]) -> dict[str, Any]:
+    """Values of the property ``experiment`` of a recording that shows one motion alone."""
+    values = {
+        "domain": name,
+        "objectives": list(weights),
+        "w": list(weights.values()),
+        "versions": [f"{package} {number}" for package, number in versions().items()],
+    }
+    return {key: value for key, value in values.items() if value}

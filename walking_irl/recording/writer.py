@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Generic, Self, TypeVar
@@ -18,9 +18,10 @@ from walking_irl.recording.polyhedron_view import PolyhedronView
 from walking_irl.recording.progress_view import ProgressView
 from walking_irl.recording.reader import APPLICATION_ID
 from walking_irl.recording.style import PLAYBACK_RATE
-from walking_irl.recording.summary import properties, summary
+from walking_irl.recording.summary import motion_properties, properties, summary
 from walking_irl.recording.views.view import WorldView
 from walking_irl.types import Iteration
+from walking_irl.workers import interrupts_held
 
 FLUSH_SECONDS = 60.0
 FRAMES_WITHOUT_WORLD = round(1.5 * PLAYBACK_RATE)
@@ -100,10 +101,17 @@ class Recorder(Generic[Motion]):
         self._iterations.append(it)
         self._play(clock, motion, is_last=False)
 
-    def finale(self, motion: Motion) -> None:
-        """Show the motion of the recovered weights, for longer, as part of the last iteration."""
+    def finale(self, motion: Motion | None) -> None:
+        """Show the answer, as part of the last iteration: the estimate alone, without a query.
+
+        Args:
+            motion: Of the recovered weights, played for longer; None where there is no world.
+        """
         k = self._iterations[-1].k if self._iterations else 0
-        self._play(Clock(self._n_frames, k), motion, is_last=True)
+        clock = Clock(self._n_frames, k)
+        self._progress.log_answer(self._stream, clock)
+        self._polyhedron.log_answer(self._stream, clock)
+        self._play(clock, motion, is_last=True)
 
     def __exit__(
         self,
@@ -113,7 +121,8 @@ class Recorder(Generic[Motion]):
     ) -> None:
         ending = None if kind is None else _ending(kind)
         try:
-            self._save(ending)
+            with interrupts_held():  # a second Ctrl-C, or one at the very end
+                self._save(ending)
         except RecordingError as failure:
             if error is None:
                 raise
@@ -140,7 +149,14 @@ class Recorder(Generic[Motion]):
 
 
 def record_motion(
-    path: str | Path, world: WorldView[Motion], motion: Motion, *, title: str, text: str = ""
+    path: str | Path,
+    world: WorldView[Motion],
+    motion: Motion,
+    *,
+    title: str,
+    text: str = "",
+    weights: Mapping[str, float] | None = None,
+    plots: Mapping[str, Sequence[str]] | None = None,
 ) -> Path:
     """Record one motion alone, without any inverse problem.
 
@@ -150,18 +166,21 @@ def record_motion(
         motion: What to show, for as long as the last motion of a run.
         title: Name of the recording.
         text: Markdown below the title.
+        weights: What it is the best motion for, by objective; kept as properties of the file.
+        plots: Further plots beside the world's own curves: entities by the plot's name.
 
     Raises:
         RecordingError: If ``path`` cannot be written, or Rerun is disabled.
     """
     target = check_writable(path, RecordingError)
     stream, memory = open_stream()
-    stream.send_blueprint(motion_blueprint(world))
+    stream.send_blueprint(motion_blueprint(world, plots or {}))
     stream.send_recording_name(title)
     world.log_static(stream)
     world.log_iteration(stream, Clock(0, 0), motion, True)
     markdown = rr.TextDocument(f"# {title}\n\n{text}", media_type=rr.MediaType.MARKDOWN)
     stream.log("summary", markdown, static=True)
+    stream.send_property("experiment", rr.AnyValues(**motion_properties(title, weights or {})))
     stream.flush(timeout_sec=FLUSH_SECONDS)
     write_file(target, memory.drain_as_bytes(), RecordingError)
     return target

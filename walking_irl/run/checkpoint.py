@@ -15,10 +15,11 @@ from typing import Any, get_type_hints
 
 import numpy as np
 
+from walking_irl.archives import read_arrays
 from walking_irl.arrays import Array
 from walking_irl.domains import load
 from walking_irl.domains.contract import Demonstration, Domain, Truth, settings
-from walking_irl.errors import InvalidInputError
+from walking_irl.errors import InvalidInputError, reason
 from walking_irl.files import UNREADABLE, to_plain, write_arrays
 from walking_irl.run.setup import Setup
 from walking_irl.types import Expert, Forward, Response
@@ -110,19 +111,15 @@ def load_checkpoint(path: Path) -> Checkpoint:
     Raises:
         InvalidInputError: If there is no such file, or it holds something else.
     """
-    try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
-            arrays = {name: data[name] for name in data.files}
-    except FileNotFoundError as error:
-        raise InvalidInputError(f"there is no file {path}") from error
-    except UNREADABLE as error:
-        raise InvalidInputError(f"{path} is not a readable run: {error}") from error
+    if not path.is_file():
+        raise InvalidInputError(f"there is no file {path}")
+    arrays = read_arrays(path)
     try:
         return _unpacked(arrays)
     except (*UNREADABLE, IndexError, InvalidInputError) as error:
         raise InvalidInputError(
-            f"{path} is not a run that this version can resume ({error}); give the checkpoint that "
-            "walking-irl recover wrote beside its recording"
+            f"{path} is not a run that this version can resume ({reason(error)}); give the "
+            "checkpoint that walking-irl recover wrote beside its recording"
         ) from error
 
 
@@ -132,12 +129,12 @@ def _unpacked(arrays: Mapping[str, Any]) -> Checkpoint:
         raise InvalidInputError(f"its format is {about['format']}, expected {FORMAT}")
     setup = _setup(about["setup"], about["format"])
     domain = load(setup.domain)
-    K = len(domain.objectives)
+    K, covariance = len(domain.objectives), arrays.get("expert_covariance")
     expert = Expert(
         mu=_finite(arrays["expert_mu"], K),
         error=_finite(arrays["expert_error"], K),
         suboptimality=float(about["suboptimality"]),
-        covariance=arrays.get("expert_covariance"),
+        covariance=None if covariance is None else _finite(covariance, K, K),
         n_samples=int(about["n_samples"]),
         demonstration=domain.unpack(arrays["demonstration"]),
     )

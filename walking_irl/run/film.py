@@ -24,9 +24,8 @@ class Film(NamedTuple):
         self.recorder.iteration(it, self._motion(it))
 
     def finale(self, it: Iteration) -> None:
-        """Show the policy of the recovered weights, for longer."""
-        if self.world is not None:
-            self.recorder.finale(self._motion(it))
+        """Show the answer, with the policy of the recovered weights for longer."""
+        self.recorder.finale(self._motion(it))
 
     def _motion(self, it: Iteration) -> Any:
         return None if self.world is None else self.world.motion(it.response.policy, it.w)

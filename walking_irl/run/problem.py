@@ -61,8 +61,7 @@ class Problem:
     @property
     def min_weight(self) -> float:
         """The learner's lower bound of every weight, the domain's where none was asked for."""
-        asked = self.setup.min_weight
-        return self.domain.defaults.min_weight if asked is None else asked
+        return _least_weight(self.setup, self.domain)
 
     @property
     def max_solves(self) -> int:
@@ -86,9 +85,16 @@ def prepare(
         FallError: If a recorded expert falls.
     """
     domain = load(setup.domain)
+    least, K = _least_weight(setup, domain), len(domain.objectives)
+    if not least * K < 1.0:
+        raise InvalidInputError(
+            f"min-weight must lie below 1/{K}, as {K} weights sum to 1, got {least:g}"
+        )
     if setup.demonstration is None:
         rng = np.random.default_rng(setup.seed)
         shown = domain.demonstrate(_request(setup, domain), rng=rng, executor=executor)
+        if shown.truth is not None:
+            _refuse_small(shown.truth.w, least, domain)
     else:
         without_effect = (["expert"] if setup.expert != Setup.expert else []) + [*setup.options]
         refuse(without_effect, without_effect, "a demonstration file holds the expert as it is")
@@ -118,6 +124,11 @@ def pose(
     return Problem(setup, domain, demonstration, learner)
 
 
+def _least_weight(setup: Setup, domain: Domain) -> float:
+    """The least weight that is looked for."""
+    return domain.defaults.min_weight if setup.min_weight is None else setup.min_weight
+
+
 def _vouched(expert: Expert, gap: float) -> Expert:
     """The expert, as sub-optimal as a person says, relative to its return."""
     size = float(np.mean(np.abs(expert.mu)))
@@ -128,8 +139,7 @@ def _request(setup: Setup, domain: Domain) -> Request:
     if setup.weights is None:
         return Request(None, setup.expert, setup.options)
     w_E = normalised(setup.weights, domain.objectives)
-    low = domain.defaults.min_weight if setup.min_weight is None else setup.min_weight
-    _refuse_small(w_E, low, domain)
+    _refuse_small(w_E, _least_weight(setup, domain), domain)
     refuse(setup.options, ["population"], "weights are given, so none are drawn")
     return Request(w_E, setup.expert, setup.options)
 

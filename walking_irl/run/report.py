@@ -115,6 +115,18 @@ class Report:
         return None if truth is None or mu is None else truth.relative_loss(mu)
 
     @property
+    def beaten_by(self) -> float | None:
+        """By how much the best policy that the learner found beats the expert's own, relative.
+
+        Under the ground-truth weights; at least 0. An expert that is meant to be optimal had missed
+        that policy.
+        """
+        found = [it.response.mu for it in self.iterations]
+        losses = [self.relative_loss(mu) for mu in (*found, self.recovered_mu) if mu is not None]
+        gains = [-loss for loss in losses if loss is not None]
+        return max(0.0, *gains) if gains else None
+
+    @property
     def solves_to_1pct(self) -> int | None:
         """Forward solves until some policy found lost less than 1 % under the true weights."""
         for it in self.iterations:
@@ -138,6 +150,7 @@ class Report:
             "contains_expert": self.contains_expert,
             "l1_error": self.l1_error,
             "relative_loss": self.relative_loss(self.recovered_mu),
+            "expert_beaten_by": self.beaten_by,
             "expert_gap": setup.expert_gap,
             "n_samples": self.expert.n_samples,
             "regret": last.best_regret,

@@ -22,6 +22,7 @@ from walking_irl.run.report import Report
 from walking_irl.run.setup import Setup
 from walking_irl.run.stopwatch import Stopwatch, Timed
 from walking_irl.types import Iteration, Mode, Rule
+from walking_irl.workers import interrupts_held, interrupts_kept
 
 if TYPE_CHECKING:
     from walking_irl.run.film import Film
@@ -62,14 +63,13 @@ def run(
         problem = _problem(setup, resumed, executor, on_step)
     on_expert(problem)
     report = Report(problem)
-    n_known = 0
-    if resumed is not None:
-        n_known = len(resumed.answers)
-        if setup.checkpoint is not None:  # it may be another file than the one that was read
-            save_checkpoint(setup.checkpoint, replace(resumed, setup=setup))
-            report.checkpoint = str(setup.checkpoint)
+    known = Checkpoint(setup, problem.demonstration, []) if resumed is None else resumed
+    if setup.checkpoint is not None:  # when resumed, it may be another file than that was read
+        save_checkpoint(setup.checkpoint, replace(known, setup=setup))
+        report.checkpoint = str(setup.checkpoint)
     try:
-        _learn(report, watch, n_known, executor, on_iteration)
+        with interrupts_kept():
+            _learn(report, watch, len(known.answers), executor, on_iteration)
     except (KeyboardInterrupt, SolverError, FallError, RecordingError) as trouble:
         if not report.iterations:
             raise
@@ -119,8 +119,8 @@ def _learn(
             recorded = stack.enter_context(film(problem, problem.setup.record))
             report.recording = str(problem.setup.record)
         for it in _timed(problem, watch, executor):
-            report.iterations.append(it)
-            with watch.part("recording"):
+            with interrupts_held(), watch.part("recording"):
+                report.iterations.append(it)
                 _keep(report, n_known)
             on_iteration(it, report)
             if recorded is not None:

@@ -108,7 +108,7 @@ def test_same_seed_same_walk_other_seed_other_walk(walking):
 
 def test_kicks_come_once_in_every_cycle(walking):
     walker, _, policy = walking
-    kicked = rollout(walker, policy, cycles=6, rng=np.random.default_rng(0), kicks=0.5)
+    kicked = rollout(walker, policy, cycles=6, rng=np.random.default_rng(0), kicks=0.2)
     jump = kicked.v[1:] - kicked.v[:-1] - policy.timestep * kicked.a[:-1]
     at = np.flatnonzero(np.abs(jump).max(1) > 1e-6)
     assert list(at // policy.steps_per_cycle) in ([0, 1, 2, 3, 4, 5], [0, 1, 2, 3, 4, 5, 6])

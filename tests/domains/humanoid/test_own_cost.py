@@ -9,12 +9,13 @@ import pytest
 from walking_irl.domains.humanoid.closed_loop.environment import environment, start_of
 from walking_irl.domains.humanoid.closed_loop.trials import Trials, measure
 from walking_irl.domains.humanoid.costs.base import Cost, Term, read_joints
-from walking_irl.domains.humanoid.costs.defaults import DEFAULT_COSTS, REFERENCE_WEIGHTS
+from walking_irl.domains.humanoid.costs.defaults import DEFAULT_COSTS
 from walking_irl.domains.humanoid.domain import Humanoid
 from walking_irl.domains.humanoid.gait.library import load_gaits
 from walking_irl.domains.humanoid.learner import WarmStartSolver, check_weights, search, solver_for
 from walking_irl.domains.humanoid.optimiser.linearisation import weighted
 from walking_irl.domains.humanoid.population import POPULATIONS
+from walking_irl.domains.humanoid.spec import PLANAR
 from walking_irl.errors import InvalidInputError
 
 KNEES = ("knee_r", "knee_l")
@@ -71,7 +72,8 @@ def test_gradient_of_a_changed_stack_agrees_with_finite_differences(domain):
 def test_own_cost_changes_the_best_gait_as_it_says():
     """With a weight on knee flexion the knee bends less, at the price of the others."""
     domain, start = SEVEN, reference(SEVEN)
-    w = np.append(0.9 * REFERENCE_WEIGHTS, 0.1)
+    usual = PLANAR.stack.reference_weights
+    w = np.append(0.9 * usual, 0.1)
     bent, before = [], solver_for(domain.spec).problem.evaluate(start.to_vector())
     response = search(domain.spec, w, starts=1)
     for gait in (start, response.policy):
@@ -81,7 +83,7 @@ def test_own_cost_changes_the_best_gait_as_it_says():
     assert response.mu.shape == (7,) and response.evaluated.shape[1] == 7
     assert response.sensitivity is None or response.sensitivity.shape == (7, 7)
     assert w @ response.mu > -w @ before.total_costs()
-    assert REFERENCE_WEIGHTS @ response.mu[:6] < -REFERENCE_WEIGHTS @ before.total_costs()[:6]
+    assert usual @ response.mu[:6] < -usual @ before.total_costs()[:6]
 
 
 @pytest.mark.parametrize("domain", [SEVEN, FOUR], ids=["seven", "four"])
@@ -117,5 +119,5 @@ def test_own_costs_travel_to_worker_processes():
 
 def test_own_cost_has_the_share_of_a_reference_that_does_not_know_it():
     w = SEVEN.spec.stack.reference_weights
-    np.testing.assert_allclose(w[:6] / w[:6].sum(), REFERENCE_WEIGHTS, rtol=1e-12)
+    np.testing.assert_allclose(w[:6] / w[:6].sum(), PLANAR.stack.reference_weights, rtol=1e-12)
     assert w[6] == pytest.approx(0.1 / 1.1)

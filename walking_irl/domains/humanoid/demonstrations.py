@@ -19,6 +19,7 @@ import mujoco
 import numpy as np
 from scipy.optimize import nnls
 
+from walking_irl.archives import read_arrays
 from walking_irl.arrays import Array
 from walking_irl.domains.humanoid.body.anatomy import Walker
 from walking_irl.domains.humanoid.closed_loop.trials import part
@@ -28,7 +29,6 @@ from walking_irl.domains.humanoid.gait.gait import Gait, cycle_motion, whole_cyc
 from walking_irl.domains.humanoid.gait.phase import anchored_cycle
 from walking_irl.domains.humanoid.learner import solver_for
 from walking_irl.domains.humanoid.optimiser.stages import DIRECT, stage
-from walking_irl.domains.humanoid.recorded.archives import read_arrays
 from walking_irl.domains.humanoid.spec import WalkerSpec
 from walking_irl.errors import InvalidInputError
 from walking_irl.expert import expert_from_returns

@@ -102,7 +102,7 @@ class Humanoid:
     """
 
     options: Mapping[str, Option] = OPTIONS
-    defaults = Defaults(max_solves=20, min_weight=MIN_WEIGHT)
+    defaults = Defaults(20, MIN_WEIGHT, needs_workers=True, files="walking")
     view: str | None = "walker"
     has_trajectories = True
 

@@ -4,8 +4,9 @@ Newton's method finds the minimum of a basin at once, so the price is the search
 the known gaits that are cheapest under the weights and from the reference, all at a low root
 penalty; the best basins go to the full one. A still lower penalty first lets a gait leave its basin
 for a better one, or a worse one: both are tried. Detours over the optimal gaits of neighbouring
-weights then find what a learner would find. An optimum that is no smooth minimum sits on a contact
-jump: it is perturbed and solved again.
+weights then find what a learner would find, and known gaits that are still cheaper are finished
+themselves. An optimum that is no smooth minimum sits on a contact jump: it is perturbed and solved
+again.
 """
 
 from __future__ import annotations
@@ -17,7 +18,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from walking_irl.arrays import Array
-from walking_irl.domains.humanoid.learner import check_weights, known_gaits, polish, solver_for
+from walking_irl.domains.humanoid.learner import (
+    Start,
+    check_weights,
+    known_gaits,
+    polish,
+    solver_for,
+)
 from walking_irl.domains.humanoid.optimiser.solver import Solution
 from walking_irl.domains.humanoid.optimiser.stages import Stage, stage
 from walking_irl.domains.humanoid.spec import WalkerSpec
@@ -136,10 +143,17 @@ def best_gait(
         if not job.cost(other) < job.cost(best) * (1 - SAME_BASIN):
             break
         raised += job.run([(other.x, FINISH, other.root)])
-    chosen = _finish(job, raised, rng)
+    chosen = _finish(job, raised + _cheaper(job, known, raised), rng)
     return OptimalGait(
         chosen.x, chosen.total_costs, job.decrement(chosen), job.starts, job.iterations
     )
+
+
+def _cheaper(job: _Search, known: Sequence[Start], found: Sequence[Solution]) -> list[Solution]:
+    """Solutions in the basins of known gaits that are cheaper than all that was found."""
+    least = min(job.cost(s) for s in found)
+    missed = [s.x for s in known if float(s.total_costs @ job.w) < least]
+    return job.run([(x, FINISH, job.solver.dual(x)) for x in missed])
 
 
 def _detour(spec: WalkerSpec, w: Array, other: Array, x: Array, root: Array | None) -> Solution:

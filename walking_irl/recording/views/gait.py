@@ -19,6 +19,7 @@ from walking_irl.types import Rollout
 FORCE_SCALE = 1.0e-3  # [m/N]
 GHOST = style.with_alpha(style.GHOST, 0.62)
 MAIN_JOINTS = ("hip_flexion_r", "knee_r", "ankle_r")
+SPEED, FORCE = "curves/speed", "curves/vertical_force"
 BESIDE = 0.9
 """How far to the learner's left the ghost walks [m]."""
 TRAIL_FRAMES = 80
@@ -62,11 +63,18 @@ class WalkerView:
         trail = rr.Points3D.from_fields(colors=[style.TRAIL], radii=[0.009])
         stream.log("world/com_trail", trail, static=True)
         for _, name in self._hinges():
-            lines = rr.SeriesLines(names=[name])  # alone, each joint has its own colour
+            lines = rr.SeriesLines(names=[name])
+            if self.expert is None and name in MAIN_JOINTS:
+                colour = style.OTHERS[MAIN_JOINTS.index(name)]
+                lines = rr.SeriesLines(names=[name], colors=[colour], widths=[2.0])
             if self.expert is not None:
                 names = [f"{name} learner", f"{name} expert"]
                 lines = rr.SeriesLines(names=names, colors=[style.LEARNER, style.EXPERT])
             stream.log(_joint_path(name), lines, static=True)
+        names = ["learner", "expert"][: 2 if self.expert is not None else 1]
+        colours = [style.LEARNER, style.EXPERT][: len(names)]
+        for path in (SPEED, FORCE):
+            stream.log(path, rr.SeriesLines(names=names, colors=colours), static=True)
 
     def log_iteration(
         self, stream: rr.RecordingStream, clock: Clock, motion: Rollout, is_last: bool
@@ -84,12 +92,15 @@ class WalkerView:
             origins=learner.force_at, vectors=FORCE_SCALE * learner.force
         ).partition(learner.n_contacts)
         stream.send_columns("world/contacts", index, arrows)
-        angles = [learner.q]
+        shown = [learner]
         if self.expert is not None:
             ghost = play(self.model, self.expert, n, self._x)
             self._log_walker(stream, clock, "world/expert", beside(ghost))
-            angles.append(ghost.q)
-        self._log_joints(stream, clock, np.stack(angles, axis=2))
+            shown.append(ghost)
+        self._log_joints(stream, clock, np.stack([f.q for f in shown], axis=2))
+        for path, of in ((SPEED, speed), (FORCE, self._load)):
+            values = rr.Scalars.columns(scalars=np.stack([of(f) for f in shown], axis=1).ravel())
+            stream.send_columns(path, index, values.partition([len(shown)] * n))
         self._x += distance(motion, n)
         return n
 
@@ -126,6 +137,10 @@ class WalkerView:
             f"/{_joint_path(n)}" for n in names if n in MAIN_JOINTS or not {*MAIN_JOINTS} & {*names}
         ]
 
+    def plots(self) -> dict[str, list[str]]:
+        """Further curves, by name and unit."""
+        return {"Speed [m/s]": [f"/{SPEED}"], "Vertical force [body weights]": [f"/{FORCE}"]}
+
     def describe(self) -> str:
         """One sentence for the summary."""
         ghost = " with the expert as a **red ghost**" if self.expert is not None else ""
@@ -133,6 +148,13 @@ class WalkerView:
             f"the best gait for the weights queried{ghost}; they start each iteration together, "
             "and orange arrows are ground reaction forces"
         )
+
+    def _load(self, frames: Frames) -> Array:
+        """Vertical ground reaction force on all feet [body weights], shape (n,)."""
+        owner = np.repeat(np.arange(len(frames)), frames.n_contacts.astype(int))
+        total = np.bincount(owner, frames.force[:, 2], minlength=len(frames))
+        gravity = abs(float(self.model.opt.gravity[2]))
+        return np.asarray(total / (float(self.model.body_subtreemass[0]) * gravity))
 
     def _log_walker(
         self, stream: rr.RecordingStream, clock: Clock, root: str, frames: Frames
@@ -162,6 +184,13 @@ class WalkerView:
 def beside(ghost: Frames) -> Frames:
     """The same walk, moved to the learner's left."""
     return replace(ghost, position=ghost.position + [0.0, BESIDE, 0.0])
+
+
+def speed(frames: Frames) -> Array:
+    """Forward speed of the centre of mass [m/s], shape (n,)."""
+    if len(frames) < 2:
+        return np.zeros(len(frames))
+    return np.asarray(np.gradient(frames.com[:, 0]) * style.PLAYBACK_RATE)
 
 
 def _joint_path(name: str) -> str:

@@ -61,12 +61,24 @@ class PathView:
         at = np.c_[poses[:, :2] - 0.42 * _towards(poses[:, 2])[:, :2], np.zeros(len(poses))]
         at[1:, :2] = poses[1:, :2] + 0.62 * _towards(poses[1:, 2])[:, :2]
         stream.log("world/goals/names", text_3d(at, names), static=True)
+        self._log_scale(stream)
         _log_look(stream, "world/learner", len(self.goals), style.LEARNER, 1.0)
         if self.expert is not None:
             _log_look(stream, "world/expert", len(self.goals), style.GHOST, 0.62)
             _log_paths(stream, "world/expert", self.expert, style.GHOST, 0.035, static=True)
         for i in range(len(self.goals)):
             log_pair(stream, curve_path(i), f"goal {i + 1}", self.expert is not None)
+
+    def _log_scale(self, stream: rr.RecordingStream) -> None:
+        """A bar of one metre, left of and below everything."""
+        points = np.vstack([np.zeros(2), self.goals[:, :2]])
+        x, y = points.min(axis=0) - [0.3, 0.6]
+        ends = np.array([[x, y, 0.0], [x + 1.0, y, 0.0]])
+        up = np.array([0.0, 0.08, 0.0])
+        strips = [ends, *([end - up, end + up] for end in ends)]
+        bar = rr.LineStrips3D(strips, colors=[style.INK], radii=rr.Radius.ui_points([1.5]))
+        stream.log("world/scale", bar, static=True)
+        stream.log("world/scale/name", text_3d(ends.mean(axis=0)[None], ["1 m"]), static=True)
 
     def log_iteration(
         self, stream: rr.RecordingStream, clock: Clock, motion: PathPicture, is_last: bool

@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from walking_irl.arrays import Array
 
 TORQUE_MARGIN = 1.5
-"""Torques are clipped at this multiple of the strengths (the actuators' control range)."""
+"""Torques are clipped at this multiple of the strengths: the actuators' control range, less what it
+takes to let go of a tendon in the neutral posture."""
 
 FLIPPED_JOINTS = (
     "root_y",
@@ -86,6 +87,11 @@ class Walker:
             [rows.stop - rows.start for rows in self.sensor.values()],
         )
 
+    @cached_property
+    def tendon_stiffness(self) -> Array:
+        """Cubic part k3 of each driven joint's stiffness [Nm/rad^3], shape (nu,)."""
+        return _constant(np.array(self.model.jnt_stiffnesspoly[self.n_root :, 1]))
+
     @property
     def torque_mirror(self) -> Array:
         """Swaps the sides of joint torques, shape (nu, nu)."""
@@ -107,6 +113,9 @@ def walker_of(model: mujoco.MjModel, body: str, name: str) -> Walker:
     }
     limited = model.jnt_limited.astype(bool)
     mass = float(mujoco.mj_getTotalmass(model))
+    tendon = _tendon_torque(model)
+    upper = model.actuator_ctrlrange[:, 1] + np.minimum(tendon, 0)
+    lower = model.actuator_ctrlrange[:, 0] + np.maximum(tendon, 0)
     return Walker(
         body=body,
         name=name,
@@ -114,8 +123,8 @@ def walker_of(model: mujoco.MjModel, body: str, name: str) -> Walker:
         joints=joints,
         n_root=model.nv - model.nu,
         mirror=_constant(_joint_mirror(joints)),
-        strength_plus=_constant(model.actuator_ctrlrange[:, 1] / TORQUE_MARGIN),
-        strength_minus=_constant(-model.actuator_ctrlrange[:, 0] / TORQUE_MARGIN),
+        strength_plus=_constant(upper / TORQUE_MARGIN),
+        strength_minus=_constant(-lower / TORQUE_MARGIN),
         lower=_constant(np.where(limited, model.jnt_range[:, 0], -np.inf)),
         upper=_constant(np.where(limited, model.jnt_range[:, 1], np.inf)),
         mass=mass,
@@ -124,6 +133,12 @@ def walker_of(model: mujoco.MjModel, body: str, name: str) -> Walker:
         sensor_mirror=_constant(_sensor_mirror(sensor)),
         sensor_advance=_constant(_sensor_advance(sensor)),
     )
+
+
+def _tendon_torque(model: mujoco.MjModel) -> Array:
+    """Torque of the tendons (cubic stiffness) in the neutral posture [Nm], shape (nu,)."""
+    hinges = slice(model.nv - model.nu, None)
+    return np.asarray(model.jnt_stiffnesspoly[hinges, 1] * model.qpos_spring[hinges] ** 3)
 
 
 def lowest_points(walker: Walker, q: Array) -> Array:

@@ -21,7 +21,7 @@ from walking_irl.domains.humanoid.body.anatomy import (
     walker_of,
 )
 from walking_irl.domains.humanoid.body.variants import model_of, parted, variant
-from walking_irl.errors import InvalidInputError
+from walking_irl.errors import InvalidInputError, reason
 from walking_irl.files import model_path
 
 SHIPPED = {"humanoid": "humanoid.xml", "humanoid-planar": "humanoid_planar.xml"}
@@ -75,7 +75,7 @@ def _load(body: str) -> Walker:
     try:
         model = model_of(path, around)
     except ValueError as error:
-        raise InvalidInputError(f"{path} is not a readable MJCF file: {error}") from error
+        raise InvalidInputError(f"{path} is not a readable MJCF file: {reason(error)}") from error
     _check(model, path)
     walker = walker_of(model, body, path.stem)
     if own == body:

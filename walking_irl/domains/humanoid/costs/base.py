@@ -114,12 +114,14 @@ class Cost(Squares):
         formula: The cost as text.
         reference: Coefficient of the raw cost in the most human gait known; None: a tenth of the
             whole.
+        planar_reference: The same of a walker in the sagittal plane; None: as of any other.
     """
 
     scale: float
     meaning: str
     formula: str = ""
     reference: float | None = None
+    planar_reference: float | None = None
 
     @property
     def objective(self) -> Objective:

@@ -22,10 +22,11 @@ class Impact(Cost):
 
     name: str = "impact"
     unit: str = "(10 BW/s)^2"
-    scale: float = 0.5
+    scale: float = 0.91
     meaning: str = "Squared rate of the ground reaction force under each foot."
     formula: str = "|dF/dt|^2"
-    reference: float | None = 0.2
+    reference: float | None = 0.5
+    planar_reference: float | None = 0.505
     rate: float = 10.0
 
     def terms(self, walker: Walker) -> Sequence[Term]:

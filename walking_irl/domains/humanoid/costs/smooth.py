@@ -1,4 +1,4 @@
-"""Smoothness: squared joint accelerations."""
+"""Smoothness: squared joint accelerations and squared rates of the joint torques."""
 
 from __future__ import annotations
 
@@ -6,30 +6,49 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from walking_irl.domains.humanoid.body.anatomy import Walker
-from walking_irl.domains.humanoid.costs.base import Cost, Term, read_joints
+from walking_irl.domains.humanoid.costs.base import Cost, H, Term, read_joints
 
 
 @dataclass(frozen=True)
 class Smoothness(Cost):
-    """Squared joint accelerations.
+    """Half the squared joint accelerations, and the squared rates of the motors' torques.
+
+    Muscles build up force within a tenth of a second; torques that jump look like a robot.
 
     Attributes:
         acceleration: Unit of acceleration [rad/s^2].
+        rate: Unit of the torque's rate [mean strength of both directions / s].
     """
 
     name: str = "smooth"
-    unit: str = "(50 rad/s^2)^2"
-    scale: float = 5.0
-    meaning: str = "Squared joint accelerations."
-    formula: str = "|a / 50|^2"
-    reference: float | None = 0.02
+    unit: str = "1"
+    scale: float = 6.0
+    meaning: str = "Squared joint accelerations, and squared rates of the joint torques."
+    formula: str = ".5 |a / (50 rad/s^2)|^2 + |dtau/dt / (5 strengths/s)|^2"
+    reference: float | None = 0.1219
+    planar_reference: float | None = 0.0907
     acceleration: float = 50.0
+    rate: float = 5.0
 
     def terms(self, walker: Walker) -> Sequence[Term]:
-        """One residual an actuated joint."""
+        """Two residuals an actuated joint."""
+        unit = self.rate * (walker.strength_plus + walker.strength_minus) / 2
 
-        def residual(a: Any) -> Any:
-            return a / self.acceleration
+        def acceleration(a: Any) -> Any:
+            return np.sqrt(0.5) / self.acceleration * a
 
-        return [Term((read_joints(walker, "a"),), residual, is_linear=True)]
+        def rate(tau: Any, tau_next: Any, h: Any) -> Any:
+            return (tau_next - tau) / h / unit
+
+        def second(tau: Any, tau_next: Any, h: Any) -> dict[tuple[int, int], Any]:
+            slope = 1 / (h * h * unit)
+            return {(0, 2): slope, (1, 2): -slope, (2, 2): 2 * (tau_next - tau) * slope / h}
+
+        torques = (read_joints(walker, "tau"), read_joints(walker, "tau_next"), H)
+        return [
+            Term((read_joints(walker, "a"),), acceleration, is_linear=True),
+            Term(torques, rate, second=second),
+        ]

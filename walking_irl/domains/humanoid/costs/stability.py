@@ -34,10 +34,11 @@ class Stability(Cost):
 
     name: str = "stability"
     unit: str = "1"
-    scale: float = 1.0
+    scale: float = 0.61
     meaning: str = "Shaking of the head and trunk, and angular momentum about the centre of mass."
     formula: str = "|head|^2 / .08 + |balance|^2 / .12"
-    reference: float | None = 0.18
+    reference: float | None = 0.598
+    planar_reference: float | None = 0.4757
 
     def terms(self, walker: Walker) -> Sequence[Term]:
         """One residual a component that shakes."""

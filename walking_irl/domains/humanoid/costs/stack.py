@@ -116,10 +116,16 @@ class CostStack:
     @cached_property
     def reference_weights(self) -> Array:
         """Weights of the most human gait known, as far as the costs know them; shape (K,)."""
-        default = REFERENCE_SHARE * UNIT
-        known = [default / c.scale if c.reference is None else c.reference for c in self.per_metre]
-        w = np.array(known) * self._scales
-        return np.asarray(w / w.sum())
+        shares = {c.name: self._share(c) for c in self.per_metre}
+        whole = sum(share for share in shares.values() if share is not None) or UNIT
+        w = [REFERENCE_SHARE * whole if s is None else s for s in shares.values()]
+        return np.asarray(w) / sum(w)
+
+    def _share(self, cost: Cost) -> float | None:
+        """Scaled coefficient of a cost in the most human gait of this walker; None: unknown."""
+        is_planar = not self.walker.is_lateral and cost.planar_reference is not None
+        known = cost.planar_reference if is_planar else cost.reference
+        return None if known is None else known * cost.scale
 
     def residuals(self, c: Channels) -> Array:
         """Residuals of all terms, shape (N, M)."""

@@ -15,10 +15,11 @@ class Time(Cost):
 
     name: str = "time"
     unit: str = "0.8 s"
-    scale: float = 1.0
+    scale: float = 0.74
     meaning: str = "Time that a metre takes."
     formula: str = "1"
-    reference: float | None = 1.25
+    reference: float | None = 0.5535
+    planar_reference: float | None = 0.862
 
     def terms(self, walker: Walker) -> Sequence[Term]:
         """One in every step."""

@@ -1,4 +1,10 @@
-"""Work: mechanical power of all joints, of either sign."""
+r"""Work: what the mechanical power of all joints costs a muscle, of either sign.
+
+Muscles turn a quarter of their energy into positive work, and absorb 1.2 times the energy that
+they spend on negative work (R. Margaria 1968, Int. Z. angew. Physiol. 25:339: efficiencies of
+walking uphill and downhill), so a joule of either sign counts by its inverse efficiency, relative
+to the mean of both.
+"""
 
 from __future__ import annotations
 
@@ -14,23 +20,29 @@ from walking_irl.domains.humanoid.costs.base import Cost, Term, read_joints
 
 @dataclass(frozen=True)
 class Work(Cost):
-    """Mean absolute power, half of it with the torque held and the velocity at either end.
+    r"""Mean power of the motors, positive and negative by their inverse efficiencies.
 
-    With the velocity at one end only, torques that alternate from step to step would be free.
+    Half of it has the torque held and the velocity at either end of the step: with the velocity at
+    one end only, torques that alternate from step to step would be free. With
+    :math:`s = \sqrt{p^2 + p_0^2}`, the squared residual is
+    :math:`\tfrac12 (p^2 / s)(1 + d\, p / s) / P`, d from the two efficiencies.
 
     Attributes:
-        power: Unit of power [W].
-        smoothing: The absolute value is smooth within this [W].
+        power: Unit of power P [W].
+        smoothing: The absolute value is smooth within this power p0 [W].
+        efficiencies: Of positive and of negative work.
     """
 
     name: str = "work"
     unit: str = "100 W"
-    scale: float = 0.38
-    meaning: str = "Mechanical power, either sign."
-    formula: str = "|tau v| / 100 W"
-    reference: float | None = 1.5
+    scale: float = 2.2
+    meaning: str = "Mechanical power, negative power a fifth as dear as positive."
+    formula: str = "(1.66 max(0, tau v) + .34 max(0, -tau v)) / 100 W"
+    reference: float | None = 0.3485
+    planar_reference: float | None = 0.3105
     power: float = 100.0
     smoothing: float = 20.0
+    efficiencies: tuple[float, float] = (0.25, 1.2)
 
     def terms(self, walker: Walker) -> Sequence[Term]:
         """Two residuals a motor: at the start and at the end of a step."""
@@ -40,16 +52,29 @@ class Work(Cost):
             for velocity in ("v", "v_next")
         ]
 
+    @property
+    def asymmetry(self) -> float:
+        """How much dearer positive work is than the mean of both signs, d in 1 +- d [1]."""
+        positive, negative = (1 / e for e in self.efficiencies)
+        return (positive - negative) / (positive + negative)
+
     def residual(self, tau: Any, v: Any) -> Any:
-        """Signed root of about half the absolute power in its unit, smooth through zero."""
+        """Signed root of about half the power in its unit, smooth through zero."""
         p = tau * v
-        return np.sqrt(0.5 / self.power) * p / np.sqrt(np.sqrt(p * p + self.smoothing**2))
+        s = np.sqrt(p * p + self.smoothing**2)
+        return np.sqrt(0.5 / self.power) * p * np.sqrt((1 + self.asymmetry * p / s) / s)
 
     def second(self, tau: Any, v: Any) -> dict[tuple[int, int], Any]:
         """Second partial derivatives of :meth:`residual`."""
-        p = tau * v
-        s = p * p + self.smoothing**2
-        root = np.sqrt(0.5 / self.power) / np.sqrt(np.sqrt(s))
+        p, soft = tau * v, self.smoothing**2
+        s = p * p + soft
+        share, d = p / np.sqrt(s), self.asymmetry
+        root = np.sqrt(0.5 / self.power) / np.sqrt(np.sqrt(s))  # residual: root p dear
+        dear = np.sqrt(1 + d * share)
+        dear1 = d * soft / (s * np.sqrt(s)) / (2 * dear)
+        dear2 = -3 * p / s * dear1 - dear1 * dear1 / dear
         slope = root * (1 - 0.5 * p * p / s)
         bend = root * p / s * (1.25 * p * p / s - 1.5)
-        return {(0, 0): bend * v * v, (1, 1): bend * tau * tau, (0, 1): slope + bend * p}
+        first = slope * dear + root * p * dear1
+        second = bend * dear + 2 * slope * dear1 + root * p * dear2
+        return {(0, 0): second * v * v, (1, 1): second * tau * tau, (0, 1): first + second * p}

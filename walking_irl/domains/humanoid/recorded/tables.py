@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
+from walking_irl.archives import read_columns
 from walking_irl.arrays import Array
-from walking_irl.domains.humanoid.recorded.archives import read_columns
 from walking_irl.errors import InvalidInputError
 
 LARGEST_TEXT = 200_000_000  # [bytes]

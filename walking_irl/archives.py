@@ -17,7 +17,7 @@ from zipfile import BadZipFile, ZipFile, ZipInfo
 import numpy as np
 
 from walking_irl.arrays import Array
-from walking_irl.errors import InvalidInputError
+from walking_irl.errors import InvalidInputError, reason
 
 LARGEST = 400_000_000
 """Bytes that all arrays of one file may take."""
@@ -57,8 +57,7 @@ def read_arrays(path: Path) -> dict[str, Any]:
                 out[member.filename.removesuffix(".npy")] = _array(member.filename, content)
             return out
     except UNREADABLE as error:
-        reason = str(error) or type(error).__name__
-        raise InvalidInputError(f"{path} is not a readable .npz table: {reason}") from error
+        raise InvalidInputError(f"{path} is not a readable .npz table: {reason(error)}") from error
 
 
 def read_columns(path: Path) -> dict[str, Array]:
