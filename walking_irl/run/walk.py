@@ -123,17 +123,17 @@ def explain(
     """
     starts = starting_weights(spec.stack.reference_weights) if starts is None else starts
     found: list[Fit] = run_tasks(
-        joint_fit, [(spec, walk, w, [near.gait]) for w in starts], executor
+        joint_fit, [(spec, walk, w, near, near.total_costs) for w in starts], executor
     )
     fit = min(found, key=lambda f: f.last.gap)
     end = fit.last
-    at_trials = [(spec, t, end.w, [end.near.gait]) for t in trials]
+    at_trials = [(spec, t, end.w, end.near, near.total_costs) for t in trials]
     single: list[Fit] = run_tasks(joint_fit, at_trials, executor)
     bracket, solves = bracketed(spec, fit)
     others = tuple(f.last for f in found if f is not fit)
     by_start = _farthest(end.w, [p.w for p in others])
     by_trial = _farthest(end.w, [f.last.w for f in single])
-    slack = SLACK * end.gap + (bracket[1] - bracket[0]) * end.cost
+    slack = SLACK * end.gap + bracket[1] - bracket[0]
     allowed = np.sqrt(2 * slack * np.maximum(np.diag(fit.spread), 0.0))
     half = np.sqrt(allowed**2 + by_start**2 + by_trial**2)
     return Explanation(
