@@ -65,9 +65,8 @@ def main() -> None:
 def recording() -> str:
     """The mean curves as a table in percent of the gait cycle, degrees, clinical signs."""
     curves = norm_set("adults", 1.25, 0.9).curves
-    names = [name if name.startswith("pelvis") else f"{name}_r" for name in ANGLES]
     rows = np.column_stack([PHASES, *(curves[name].mean for name in ANGLES)])
-    lines = [",".join(["percent", *names]), *(",".join(f"{v:.3f}" for v in row) for row in rows)]
+    lines = [",".join(["percent", *ANGLES]), *(",".join(f"{v:.3f}" for v in row) for row in rows)]
     return "\n".join(lines) + "\n"
 
 
