@@ -15,7 +15,7 @@ from rich.table import Table
 
 from walking_irl.cli import DONE
 from walking_irl.errors import InvalidInputError
-from walking_irl.files import check_outputs, write_json
+from walking_irl.files import check_ending, check_outputs, write_json
 from walking_irl.workers import workers
 
 if TYPE_CHECKING:
@@ -79,12 +79,15 @@ def run(args: argparse.Namespace, given: dict[str, Any], console: Console) -> in
     from walking_irl.domains.humanoid.spec import HUMANOID
 
     _refuse_others(args, given)
-    check_outputs([args.json], inputs=[p for paths in args.walk for p in paths])
+    check_ending(args.record, ".rrd")
+    check_outputs([args.json, args.record], inputs=[p for paths in args.walk for p in paths])
     people = [_read(paths, HUMANOID.walker) for paths in args.walk]
     answers = []
     with workers() as executor:
         for person, trials in people:
             answers.append(_explain(person, trials, args, console, executor))
+    if args.record is not None:
+        _record(args.record, answers[0], HUMANOID)
     if args.json is not None:
         write_json(args.json, _to_json(answers, HUMANOID))
     for answer in answers:
@@ -178,6 +181,28 @@ def _weights(answer: Answer, spec: Any) -> Table:
     for objective, numbers in zip(spec.stack.objectives, rows, strict=True):
         table.add_row(objective.name, *(f"{v:.3f}" for v in numbers))
     return table
+
+
+def _record(path: Path, answer: Answer, spec: Any) -> None:
+    """Three walkers: recorded, best for the weights, nearest; of the first person."""
+    from walking_irl.domains.humanoid.gait.gait import cycle_motion
+    from walking_irl.recording import record_motion
+    from walking_irl.recording.views.motion import periodic_rollout
+    from walking_irl.recording.views.people import PersonView
+
+    end, walker = answer.found.end, spec.walker
+    shown, near, best = (
+        periodic_rollout(*cycle_motion(g, walker.mirror), g.timestep, 2 * g.step_length)
+        for g in (answer.person.gait, end.near.gait, end.gait)
+    )
+    view = PersonView(walker.model, shown, near)
+    rows = [
+        f"| {o.name} | {w:.3f} | {h:.3f} |"
+        for o, w, h in zip(spec.stack.objectives, end.w, answer.found.half, strict=True)
+    ]
+    head = ["| objective | weight | half width |", "|---|---|---|"]
+    text = "\n".join([view.describe() + ".", "", *head, *rows, "", RESTS_ON[3:]])
+    record_motion(path, view, best, title=answer.name, text=text)
 
 
 def _forces(answer: Answer, spec: Any) -> str:
