@@ -24,7 +24,7 @@ from walking_irl.cli import BAD_INPUT, FAILED, INTERRUPTED
 from walking_irl.cli.completion import SHELLS, PrintCompletion
 from walking_irl.cli.output import Output
 from walking_irl.errors import EmptyPolyhedronError, InvalidInputError, WalkingIRLError
-from walking_irl.workers import interrupts_raised
+from walking_irl.workers import interrupts_held, interrupts_raised
 
 COMMANDS = (
     "recover",
@@ -80,7 +80,8 @@ def build_parser() -> argparse.ArgumentParser:
     )
     sub = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name in COMMANDS:
-        command = import_module(f"walking_irl.cli.{name}")  # heavy: Ctrl-C is heard during it
+        with interrupts_held():  # NumPy, for one, makes an ImportError of it
+            command = import_module(f"walking_irl.cli.{name}")
         command.add_parser(sub).set_defaults(run=command.run)
     return parser
 
