@@ -22,9 +22,10 @@ ROWS = {
     "faults": ["kill -9", "Ctrl-C", "SIGTERM", "full disk"],
     "forward_solver": ["gait solver, one iteration", "mujoco.minimize.least_squares"],
     "growth": ["3-D, 40 knots, 6 objectives", "80 knots", "planar", "9 objectives"],
+    "known_walkers": ["typical 0, 1 deg"],
     "recovery": ["MuJoCo's inverse dynamics", "linear algebra", "Hessians", "queries"],
 }
-SLOW = ("recovery", "faults")
+SLOW = ("recovery", "faults", "known_walkers")
 HEADLINES = {
     "centres": r"^ac: .* \(target >= 5\): .*\n^cc: .*\n^mvie: ",
     "closed_loop": r"^2 walks of 3 s: \d falls .*\n^pushes of 80 N: \d of 4 .*\n^pushes of 150 N: ",
@@ -33,6 +34,7 @@ HEADLINES = {
     "faults": r"^\d+ of \d+ faults survived: met$",
     "forward_solver": r"^one iteration takes .* \(target <= 33\): .*\n^derivatives are .* faster",
     "growth": r"^2 threads: .*\n^time grows with the power .* \(target <= 1\.2\): (met|NOT MET)$",
+    "known_walkers": r"^nearer than the start: \d of 1\n^half widths hold \d+ % .*: (met|NOT MET)$",
     "recovery": r"^queries take \d+\.\d% of .* \(target <= 5 %\): (met|NOT MET)$",
 }
 

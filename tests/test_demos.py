@@ -1,5 +1,6 @@
 """The demos run without a screen and leave what they promise; the planar body makes them quick."""
 
+import json
 import os
 import subprocess
 import sys
@@ -110,3 +111,19 @@ def test_a_bad_walk_is_beaten_in_every_objective(tmp_path):
         assert float(found) <= float(walker)
     content = inspect_recording(tmp_path / "better.rrd")
     assert content["status"] == "dominated" and 0 < content["bracket"][0] <= content["bracket"][1]
+
+
+@pytest.mark.slow
+def test_the_average_adult_is_near_a_gait_of_the_body(tmp_path):
+    files = ("--json", "adult.json", "--save", "adult.csv")
+    out = demo("average_adult.py", "--starts", "1", *files, folder=tmp_path)
+    w, half = rows(out.replace("+-", " "), NAMES).T
+    assert w.sum() == pytest.approx(1, abs=0.01) and (half >= 0.02).all()
+    content = json.loads((tmp_path / "adult.json").read_text())
+    low, high = content["suboptimality"]
+    assert 0 <= low <= high < 0.1 and content["nearest"]["root"] < 1e-4
+    assert content["nearest"]["sagittal"] < 5.5  # degrees: as near as to healthy adults
+    assert len((tmp_path / "adult.csv").read_text().splitlines()) == 102
+
+
+NAMES = ("effort", "work", "smooth", "stability", "impact", "time")

@@ -124,6 +124,11 @@ class Status(enum.Enum):
             Status.NOT_OPTIMAL,
         )
 
+    @property
+    def is_refuted(self) -> bool:
+        """Whether it ended because policies are known that beat the expert under all weights."""
+        return self in (Status.DOMINATED, Status.MIXTURE_DOMINATES, Status.CONTRADICTED)
+
 
 class Bracket(NamedTuple):
     """Bounds on min f, the sub-optimality that no weights explain, in units of w.mu."""

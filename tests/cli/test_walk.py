@@ -12,6 +12,7 @@ from walking_irl.domains.humanoid.body.load import load_walker
 from walking_irl.domains.humanoid.costs.defaults import REFERENCE_WEIGHTS
 from walking_irl.domains.humanoid.gait.library import load_gaits
 from walking_irl.domains.humanoid.recorded.feasible import Feasible
+from walking_irl.recording.reader import Recording
 from walking_irl.run import walk as module
 
 WALKER = load_walker()
@@ -68,10 +69,19 @@ def test_no_weights_are_told_of_what_is_no_habit_of_this_body(walked, monkeypatc
 
 @pytest.mark.slow
 def test_a_person_s_answer_comes_in_its_order(walked, monkeypatch, capsys, tmp_path):
-    """One start and one turn; the model's own walk is nearly optimal for its own weights."""
+    """One start; the model's own walk is nearly optimal for its own weights."""
     monkeypatch.setattr(module, "starting_weights", lambda reference: reference[None])
-    monkeypatch.setattr(module, "ROUNDS", 1)
-    argv = ["recover", "--walk", walked, "--walk", walked, "--json", "out.json", "--no-record"]
+    argv = [
+        "recover",
+        "--walk",
+        walked,
+        "--walk",
+        walked,
+        "--json",
+        "out.json",
+        "--record",
+        "w.rrd",
+    ]
     again = command._explain
     known = []
 
@@ -84,6 +94,9 @@ def test_a_person_s_answer_comes_in_its_order(walked, monkeypatch, capsys, tmp_p
     out = capsys.readouterr().out
     places = [out.index(f"\n{k}. ") for k in range(1, 6)]
     assert places == sorted(places) and "w.mot against w.mot" in out
+    drawn = Recording(tmp_path / "w.rrd").entities
+    for who in ("walker", "expert", "nearest"):
+        assert any(e.startswith(f"/world/{who}/") for e in drawn)
     person = json.loads((tmp_path / "out.json").read_text())["people"][0]
     low, high = person["suboptimality"]
     assert 0 <= low <= high < 0.02 and person["nearest"]["sagittal"] < 2.0

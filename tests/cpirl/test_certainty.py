@@ -109,3 +109,21 @@ def test_a_word_that_the_bracket_refutes_does_not_count():
     assert run[-1].certainty.source is Gap.MEASURED and run[-1].certainty.gap > 0.0
     lower, upper = run[-1].intervals.T
     assert ((lower <= w_E) & (w_E <= upper)).all()
+
+
+@pytest.mark.parametrize("mode", ["optimal", "set", "minimise"])
+def test_whatever_ends_a_run_its_intervals_hold_experts_not_twice_as_suboptimal(mode):
+    problem, seen = LQR(3, perturbation=0.15), set()
+    for seed in range(30):
+        rng = np.random.default_rng(seed)
+        w_E = rng.dirichlet(np.ones(3))
+        expert = problem.expert(w_E, rng)
+        run = list(cpirl(problem.forward, expert, mode=mode, rng=rng, probe=Probing()))
+        last, gap = run[-1], float(w_E @ (problem.forward(w_E).mu - expert.mu))
+        assert last.bracket.lower <= gap * (1 + 1e-9), "no weights are worse than the best"
+        if gap <= 2.0 * last.bracket.lower:
+            seen.add(last.status)
+            lower, upper = last.intervals.T
+            assert ((lower <= w_E + 1e-9) & (w_E <= upper + 1e-9)).all(), (seed, last.status)
+    ends = {Status.DOMINATED, Status.NOT_OPTIMAL} if mode == "minimise" else {Status.CONTRADICTED}
+    assert seen == ends

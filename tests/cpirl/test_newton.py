@@ -7,7 +7,9 @@ import pytest
 from problems import without_sensitivity
 from scipy.optimize import minimize
 
+from walking_irl.cpirl.bundle import Bundle
 from walking_irl.cpirl.loop import cpirl
+from walking_irl.cpirl.newton_phase import _above_unexplained
 from walking_irl.cpirl.regret_model import extremes, newton_step
 from walking_irl.domains.lqr import LQR
 from walking_irl.errors import InvalidInputError
@@ -118,3 +120,13 @@ def test_probes_at_a_bound_ask_for_other_weights():
     assert np.abs(asked - w).sum(axis=1).min() > 0.01
     assert asked.min() >= 0.0
     np.testing.assert_allclose(asked.sum(axis=1), 1.0)
+
+
+def test_a_defect_that_no_weights_explain_keeps_nobody_from_the_minimum():
+    """Whatever the features' sizes: here the heavy weight is on the small one."""
+    w, mu, defect = np.array([0.9, 0.1]), np.array([-1.0, -30.0]), 0.4
+    noise = np.full(2, 1e-3)
+    expert = Expert(mu - defect, noise, covariance=np.diag(noise**2), n_samples=20)
+    bundle = Bundle.of(expert).add(w, Response(None, mu))
+    assert bundle.relative_regrets[0] > 0.09, "far from optimal, as it seems"
+    assert _above_unexplained(bundle) == pytest.approx(0.0, abs=1e-9)

@@ -6,16 +6,15 @@ import pytest
 from walking_irl.domains.humanoid.costs.defaults import REFERENCE_WEIGHTS
 from walking_irl.domains.humanoid.gait.gait import Gait
 from walking_irl.domains.humanoid.learner import search
-from walking_irl.domains.humanoid.recorded.closeness import degrees_apart
+from walking_irl.domains.humanoid.recorded.closeness import closeness, degrees_apart
+from walking_irl.domains.humanoid.recorded.feasible import feasible_gait, sensitivity
 from walking_irl.domains.humanoid.spec import PLANAR
-from walking_irl.run import walk as module
+from walking_irl.run.joint import Walk, joint_fit
 from walking_irl.run.remembered import Remembered
 from walking_irl.run.walk import (
     BRACKET,
     MAX_SOLVES,
     NARROWEST,
-    Walk,
-    alternate,
     explain,
     nearest,
     starting_weights,
@@ -53,52 +52,63 @@ def near(walk):
 
 
 @pytest.fixture(scope="module")
-def turns(walk, near):
-    return alternate(PLANAR, walk, REFERENCE_WEIGHTS, [near.gait], 3)
+def fit(walk, near):
+    return joint_fit(PLANAR, walk, REFERENCE_WEIGHTS, near, near.total_costs)
 
 
 @pytest.mark.slow
-def test_a_walker_of_known_weights_is_explained_better_than_by_the_start(turns):
-    start, first, end = (
-        np.abs(w - TRUTH).sum() for w in (REFERENCE_WEIGHTS, turns[0].w, turns[-1].w)
-    )
-    assert max(first, end) < 0.6 * start
-    assert np.all(np.abs(turns[-1].w - TRUTH) <= turns[-1].allowed())
+def test_a_walker_of_known_weights_is_explained_better_than_by_the_start(fit):
+    start, end = (np.abs(w - TRUTH).sum() for w in (REFERENCE_WEIGHTS, fit.last.w))
+    assert end < 0.5 * start
 
 
 @pytest.mark.slow
-def test_the_gap_falls_from_turn_to_turn_and_every_bracket_is_narrow(turns):
-    gaps = [t.gap for t in turns]
+def test_the_gap_falls_to_that_of_the_truth(fit, walk, truth):
+    """At the truth the gap is at most the pull of the noise itself, 0.1 (1.5 / 3)^2 and less."""
+    gaps = [p.gap for p in fit.points]
     assert gaps == sorted(gaps, reverse=True) and gaps[-1] > 0
-    for t in turns:
-        low, high = t.bracket
-        assert 0 <= low <= high <= low + BRACKET + 1e-9
-        assert t.solves <= MAX_SOLVES
-        # a noisy gait of an optimal walker: it is nearly optimal for some weights
-        assert high < 0.01
+    pull = 0.1 * closeness(PLANAR.walker, walk.shown).squared(truth.to_vector())
+    assert gaps[-1] < 1.05 * pull < gaps[0]  # in units of the walk's cost, which is about one
 
 
 @pytest.mark.slow
-def test_the_best_gait_is_nearer_to_the_walker_than_its_noise(turns, truth):
-    apart = degrees_apart(PLANAR.walker, turns[-1].best, truth)
+def test_the_hessian_of_the_gap_predicts_gradients_between_weights(fit, walk):
+    """Central differences of G(y) - G(x) along the weights, against S_x - S_y."""
+    end = fit.last
+    forward = Remembered(end.near.gait, PLANAR)
+    step = 0.01 * (np.eye(6)[5] - end.w)
+    ends = []
+    for sign in (1, -1):
+        w = end.w + sign * step
+        y = feasible_gait(PLANAR, walk.shown, w, near=[end.near.gait])
+        ends.append(y.total_costs + forward(w).mu)
+    seen = float(step @ (ends[0] - ends[1]) / 2)
+    best = forward(end.w)
+    held = sensitivity(PLANAR, end.near, walk.shown, end.w)
+    assert held is not None and best.sensitivity is not None
+    assert seen == pytest.approx(step @ (best.sensitivity - held) @ step, rel=0.1)
+    assert np.linalg.eigvalsh(held).min() > -1e-9 * np.abs(held).max()
+
+
+@pytest.mark.slow
+def test_the_best_gait_is_nearer_to_the_walker_than_its_noise(fit, truth):
+    apart = degrees_apart(PLANAR.walker, fit.last.gait, truth)
     assert max(apart[n] for n in ("hip_flexion", "knee", "ankle")) < 1.5
 
 
 @pytest.mark.slow
-def test_half_widths_hold_the_parts_that_they_name_and_are_never_too_narrow(
-    walk, near, monkeypatch
-):
-    """One turn from each start; a second trial is the same walk with other noise."""
-    monkeypatch.setattr(
-        module, "starting_weights", lambda reference: starting_weights(reference)[:2]
-    )
-    found = explain(PLANAR, walk, near, trials=[walk], rounds=1)
+def test_half_widths_hold_the_parts_that_they_name_and_are_never_too_narrow(walk, near, fit):
+    """Two starts; a second trial is the same walk with the same noise."""
+    starts = np.array([REFERENCE_WEIGHTS, fit.last.w])
+    found = explain(PLANAR, walk, near, trials=[walk], starts=starts)
     assert len(found.others) == 1
     assert np.allclose(found.starts, np.abs(found.others[0].w - found.w))
     parts = np.sqrt(found.allowed**2 + found.starts**2 + found.trials**2)
     assert np.allclose(found.half, np.maximum(parts, NARROWEST))
     assert np.all(np.abs(found.w - TRUTH) <= found.half)
-    assert found.last.gap <= found.others[0].gap
+    assert found.end.gap <= found.others[0].gap
+    low, high = found.bracket
+    assert 0 <= low <= high <= low + BRACKET + 1e-9 and high < 0.01 and found.solves <= MAX_SOLVES
     content = explanation_json(found, walk.shown)
     assert content["w"] == found.w.tolist() and len(content["intervals"]) == 6
 
@@ -119,6 +129,17 @@ def test_weights_asked_twice_are_solved_once_and_every_answer_is_kept(truth):
     np.testing.assert_array_equal(again.mu, first.mu)
     assert (again.evaluated == other.mu).all(axis=1).any()
     assert (forward.policies() @ TRUTH).max() <= first.mu @ TRUTH + 1e-6  # the best is its own
+
+
+def test_a_gait_that_was_met_bounds_what_weights_are_worth(truth):
+    forward = Remembered(truth, PLANAR)
+    forward.meet(truth, np.full(6, 0.5))  # better than any gait
+    assert forward(TRUTH).mu @ TRUTH < -0.5
+    assert forward.value(TRUTH) == pytest.approx(-0.5)
+
+
+def test_without_a_sensitivity_steps_follow_the_gradient(truth):
+    assert np.array_equal(Remembered(truth, PLANAR).sensitivity(TRUTH), np.eye(6))
 
 
 def test_forces_of_a_gait_are_not_apart_from_its_own(truth):

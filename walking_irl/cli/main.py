@@ -26,7 +26,18 @@ from walking_irl.cli.output import Output
 from walking_irl.errors import EmptyPolyhedronError, InvalidInputError, WalkingIRLError
 from walking_irl.workers import interrupts_raised
 
-COMMANDS = ("recover", "gait", "read", "tables", "study", "inspect", "view", "domains", "methods")
+COMMANDS = (
+    "recover",
+    "gait",
+    "read",
+    "predict",
+    "tables",
+    "study",
+    "inspect",
+    "view",
+    "domains",
+    "methods",
+)
 """One module of this package each, with ``add_parser`` and ``run``."""
 EXAMPLES = """
 examples:
@@ -35,6 +46,7 @@ examples:
   walking-irl recover --weights 1,1,1,1,1,4    ground-truth weights of your own
   walking-irl recover --resume walking.checkpoint.npz --max-solves 40
   walking-irl gait --weights 1,2,1,1,1,5 --png gait.png
+  walking-irl predict --weights 1,2,1,1,1,5 --slope 3 --load 10
   walking-irl read trial1.mot trial2.mot       what a recording of a person says
   walking-irl study --domain lqr --experts 100  how often are the intervals right?
   walking-irl inspect walking.rrd

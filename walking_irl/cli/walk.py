@@ -15,7 +15,7 @@ from rich.table import Table
 
 from walking_irl.cli import DONE
 from walking_irl.errors import InvalidInputError
-from walking_irl.files import check_outputs, write_json
+from walking_irl.files import check_ending, check_outputs, write_json
 from walking_irl.workers import workers
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from walking_irl.run.walk import Explanation
 
 RESTS_ON = (
-    "5. What it rests on: a body of 1.75 m and 75 kg with these objectives (the recording is "
+    "5. What it rests on: one body with these objectives for everybody (the recording is "
     "scaled to its legs); of all gaits as near to the recording, the one that is cheapest for the "
     "weights; joint angles alone, forces are compared only; habits, pain and muscles that the body "
     "has not got count as weights."
@@ -79,12 +79,15 @@ def run(args: argparse.Namespace, given: dict[str, Any], console: Console) -> in
     from walking_irl.domains.humanoid.spec import HUMANOID
 
     _refuse_others(args, given)
-    check_outputs([args.json], inputs=[p for paths in args.walk for p in paths])
+    check_ending(args.record, ".rrd")
+    check_outputs([args.json, args.record], inputs=[p for paths in args.walk for p in paths])
     people = [_read(paths, HUMANOID.walker) for paths in args.walk]
     answers = []
     with workers() as executor:
         for person, trials in people:
             answers.append(_explain(person, trials, args, console, executor))
+    if args.record is not None:
+        _record(args.record, answers[0], HUMANOID)
     if args.json is not None:
         write_json(args.json, _to_json(answers, HUMANOID))
     for answer in answers:
@@ -120,7 +123,8 @@ def _explain(
 ) -> Answer:
     from walking_irl.domains.humanoid.recorded.feasible import check_habit
     from walking_irl.domains.humanoid.spec import HUMANOID
-    from walking_irl.run.walk import Walk, explain, nearest
+    from walking_irl.run.joint import Walk
+    from walking_irl.run.walk import explain, nearest
 
     walks = [Walk(p.gait, p.missing) for p in (person, *trials)]
     names = escape(", ".join(p.name for p in person.sources))
@@ -147,20 +151,20 @@ def _say(text: str, args: argparse.Namespace, console: Console) -> None:
 
 def _show(answer: Answer, spec: Any, console: Console) -> None:
     """The answer, in the order in which it should be read."""
-    found, person, last = answer.found, answer.person, answer.found.last
-    worst = sorted(last.near.degrees, key=lambda n: -last.near.degrees[n])[:3]
-    places = ", ".join(f"{n} {last.near.degrees[n]:.1f}" for n in worst)
-    low, high = (100 * b for b in last.bracket)
+    found, person, end = answer.found, answer.person, answer.found.end
+    worst = sorted(end.near.degrees, key=lambda n: -end.near.degrees[n])[:3]
+    places = ", ".join(f"{n} {end.near.degrees[n]:.1f}" for n in worst)
+    low, high = (100 * b for b in found.bracket)
     console.print(
         f"\n[bold]{escape(answer.name)}[/bold]\n"
-        f"1. How near the body comes: {last.near.sagittal:.1f} degrees at hips, knees and ankles "
+        f"1. How near the body comes: {end.near.sagittal:.1f} degrees at hips, knees and ankles "
         f"(farthest: {places}).\n"
         f"2. Such a walk costs {low:.1f} to {high:.1f} % more than the best one for the weights "
         "that speak most for it.\n"
         "3. These weights:"
     )
     console.print(_weights(answer, spec))
-    best, shown = last.best, person.gait
+    best, shown = end.gait, person.gait
     console.print(
         f"4. The best gait for them: {found.sagittal:.1f} degrees from the recording at hips, "
         f"knees and ankles; {best.speed:.2f} m/s ({shown.speed:.2f}), "
@@ -179,6 +183,28 @@ def _weights(answer: Answer, spec: Any) -> Table:
     return table
 
 
+def _record(path: Path, answer: Answer, spec: Any) -> None:
+    """Three walkers: recorded, best for the weights, nearest; of the first person."""
+    from walking_irl.domains.humanoid.gait.gait import cycle_motion
+    from walking_irl.recording import record_motion
+    from walking_irl.recording.views.motion import periodic_rollout
+    from walking_irl.recording.views.people import PersonView
+
+    end, walker = answer.found.end, spec.walker
+    shown, near, best = (
+        periodic_rollout(*cycle_motion(g, walker.mirror), g.timestep, 2 * g.step_length)
+        for g in (answer.person.gait, end.near.gait, end.gait)
+    )
+    view = PersonView(walker.model, shown, near)
+    rows = [
+        f"| {o.name} | {w:.3f} | {h:.3f} |"
+        for o, w, h in zip(spec.stack.objectives, end.w, answer.found.half, strict=True)
+    ]
+    head = ["| objective | weight | half width |", "|---|---|---|"]
+    text = "\n".join([view.describe() + ".", "", *head, *rows, "", RESTS_ON[3:]])
+    record_motion(path, view, best, title=answer.name, text=text)
+
+
 def _forces(answer: Answer, spec: Any) -> str:
     """How far vertical forces are from measured ones, which no weight has seen."""
     from walking_irl.run.walk_report import force_apart
@@ -188,7 +214,7 @@ def _forces(answer: Answer, spec: Any) -> str:
         return ""
     near, best = (
         force_apart(spec.walker, gait, force[:, 2])
-        for gait in (answer.found.last.near.gait, answer.found.last.best)
+        for gait in (answer.found.end.near.gait, answer.found.end.gait)
     )
     return (
         f"; vertical force {best:.2f} body weights from the measured one over stance "

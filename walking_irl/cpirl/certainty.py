@@ -90,7 +90,8 @@ def level_of(outlook: Outlook, w: Array, tol: float, asked: float | None = None)
     gap, source = _allowed(bundle, bracket)
     if asked is not None:
         gap, source = asked * abs(float(w @ bundle.mu)), Gap.ASKED
-    if outlook.levels.is_set:
+    is_refuted = bracket.lower > max(bundle.expert.suboptimality, none)
+    if outlook.levels.is_set and not is_refuted:
         gap = gap if asked is not None else bundle.expert.suboptimality
         return Level(max(gap, none), Gap.ASKED, 0.0, none, bracket)
     left = bracket.upper if bundle.is_exact else 0.0

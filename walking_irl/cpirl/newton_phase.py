@@ -145,12 +145,10 @@ class EstimatedNewton:
         """See :class:`NewtonPhase`; once near, for good."""
         if not _has_sensitivity(bundle):
             return None
-        # How perturbations are paid for is a defect that no weights explain: it is in min f, too.
-        unexplained = max(-bundle.nominal_game.value / bundle.unit, self.levels.lower_bound(bundle))
         self._is_near = (
             self._is_near
             or bundle.least_robust_regret <= 0.0
-            or float(bundle.relative_regrets.min()) - unexplained <= _NEWTON_GAP
+            or _above_unexplained(bundle) <= _NEWTON_GAP
         )
         if not self._is_near:
             return None
@@ -227,6 +225,16 @@ def _has_sensitivity(bundle: Bundle) -> bool:
 
 def _is_near(bundle: Bundle, levels: Levels) -> bool:
     return float(bundle.relative_regrets.min()) - levels.lower_bound(bundle) <= _NEWTON_GAP
+
+
+def _above_unexplained(bundle: Bundle) -> float:
+    """Best regret above what no weights explain, relative to |w.mu_E| there.
+
+    How perturbations are paid for is such a defect: it is in min f, too.
+    """
+    best = int(np.argmin(bundle.relative_regrets))
+    unexplained = max(-bundle.nominal_game.value, 0.0) / float(bundle.scale(bundle.W[best]))
+    return float(bundle.relative_regrets[best]) - unexplained
 
 
 def _share(length: float) -> float:

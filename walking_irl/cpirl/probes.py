@@ -16,9 +16,11 @@ import numpy as np
 from walking_irl.arrays import Array
 from walking_irl.cpirl.bundle import Bundle
 from walking_irl.cpirl.certainty import Level, level_of
+from walking_irl.cpirl.endings import told_true
 from walking_irl.cpirl.outlook import Decision, Outlook, Query
 from walking_irl.cpirl.record import record
 from walking_irl.cpirl.regret_model import extremes
+from walking_irl.errors import EmptyPolyhedronError
 from walking_irl.types import Forward, Iteration, Rule, Status
 
 _MOST_PROBES, _REACHED = 15, 1.02
@@ -62,7 +64,7 @@ class Probes:
         self._solver: Callable[[Forward], Forward] = lambda forward: forward
         self._n = 0
         level = self.level
-        if probing is not None and level is not None:  # at the end, with weights to be sure of
+        if probing is not None and level is not None and decision.status.has_weights:
             if outlook.levels.is_set:
                 self._queries = _until_reached(outlook, decision.estimate, level.total)
             else:
@@ -73,11 +75,12 @@ class Probes:
 
     @property
     def level(self) -> Level | None:
-        """Of the intervals, as far as the answers tell; None before the end, and without weights.
+        """Of the intervals, as far as the answers tell; None before the end, and where it is open.
 
         Without probes, cuts are far from any level: an exact expert's intervals stay theirs.
         """
-        if self.decision.query is not None or not self.decision.status.has_weights:
+        status = self.decision.status
+        if self.decision.query is not None or not (status.has_weights or status.is_refuted):
             return None
         if self.probing is None and self.outlook.bundle.is_exact:
             return None
@@ -107,8 +110,9 @@ class Probes:
             self._query = None
             with suppress(StopIteration):
                 self._query = self._queries.send(bundle)
-            status = self.decision.status if self.is_over else Status.PROBE
-            decision = self.decision._replace(status=status)
+            decision = self.decision._replace(status=Status.PROBE)
+            if self.is_over:  # what the probes found may refute it
+                self.decision = decision = told_true(self.decision, self.outlook, self.tol)
             yield record(k, query, self.outlook, decision, self.level, self._n)
             k += 1
 
@@ -156,7 +160,10 @@ def _until_reached(outlook: Outlook, estimate: Array, level: float) -> Queries:
     for direction in np.vstack([np.eye(bundle.K), -np.eye(bundle.K)]):
         for _ in range(_MOST_PROBES):
             P = bundle.polyhedron(own)
-            w = P.support(direction)[1]
+            try:
+                w = P.support(direction)[1]
+            except EmptyPolyhedronError:  # no weights explain the expert after all
+                return
             if bundle.is_asked(w):
                 break
             bundle = yield Query(w, Rule.PROBE, P)

@@ -37,37 +37,33 @@ def force_apart(walker: Walker, gait: Gait, vertical: Array) -> float:
 
 def explanation_json(found: Explanation, shown: Gait) -> dict[str, Any]:
     """An explanation as plain JSON types."""
-    last = found.last
+    end = found.end
     return {
         "nearest": {
-            "sagittal": last.near.sagittal,
-            "degrees": last.near.degrees,
-            "root": last.near.root,
-            "way": last.near.way,
-            "cost": last.cost,
+            "sagittal": end.near.sagittal,
+            "degrees": end.near.degrees,
+            "root": end.near.root,
+            "cost": end.cost,
         },
-        "suboptimality": list(last.bracket),
+        "suboptimality": list(found.bracket),
+        "bracket_solves": found.solves,
         "w": found.w.tolist(),
         "half_widths": found.half.tolist(),
         "intervals": found.intervals.tolist(),
         "from_slack": found.allowed.tolist(),
         "from_starts": found.starts.tolist(),
         "from_trials": found.trials.tolist(),
-        "best": {
-            "sagittal": found.sagittal,
-            "degrees": found.apart,
-            "speed": last.best.speed,
-            "step_length": last.best.step_length,
-            "half_period": last.best.half_period,
-        },
-        "shown": {
-            "speed": shown.speed,
-            "step_length": shown.step_length,
-            "half_period": shown.half_period,
-        },
-        "rounds": [
-            {"w": r.w.tolist(), "gap": r.gap, "bracket": list(r.bracket), "solves": r.solves}
-            for r in found.rounds
-        ],
-        "other_starts": [r.w.tolist() for r in found.others],
+        "gap": end.gap,
+        "best": {"sagittal": found.sagittal, "degrees": found.apart, **_paces(end.gait)},
+        "shown": _paces(shown),
+        "steps": [{"w": p.w.tolist(), "gap": p.gap} for p in found.fit.points],
+        "other_starts": [{"w": p.w.tolist(), "gap": p.gap} for p in found.others],
+    }
+
+
+def _paces(gait: Gait) -> dict[str, float]:
+    return {
+        "speed": gait.speed,
+        "step_length": gait.step_length,
+        "half_period": gait.half_period,
     }

@@ -40,8 +40,13 @@ def test_specs_describe_what_is_exchanged(walking):
     env = make(walking, weights=REFERENCE_WEIGHTS)
     spec = env.action_spec()
     assert spec.shape == (walker.model.nu,)
-    np.testing.assert_allclose(spec.maximum, 1.5 * walker.strength_plus)
-    np.testing.assert_allclose(spec.minimum, -1.5 * walker.strength_minus)
+    lower, upper = walker.model.actuator_ctrlrange.T
+    np.testing.assert_array_equal(spec.maximum, upper)
+    np.testing.assert_array_equal(spec.minimum, lower)
+    # half as strong again, and what it takes to let go of the tendon
+    is_strung = walker.tendon_stiffness > 0
+    np.testing.assert_allclose(upper[~is_strung], 1.5 * walker.strength_plus[~is_strung])
+    assert (upper[is_strung] > 1.5 * walker.strength_plus[is_strung]).all()
     first = env.reset()
     described = env.observation_spec()
     assert set(first.observation) == set(described)

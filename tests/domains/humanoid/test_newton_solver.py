@@ -67,13 +67,13 @@ def test_sensitivities_predict_resolved_gaits(near):
     assert np.linalg.eigvalsh(M).min() > -1e-9 * np.abs(M).max()
     np.testing.assert_allclose(M @ w, 0, atol=0.02 * np.abs(M).max())
     for j in (0, 5):
-        step = 0.004 * (np.eye(6)[j] - w)
+        step = 0.001 * (np.eye(6)[j] - w)  # farther, contacts jump
         ends = [solver.solve(w + s * step, found.x, root=found.root) for s in (1, -1)]
         dx = (ends[0].x - ends[1].x) / 2
         dmu = -(ends[0].total_costs - ends[1].total_costs) / 2
-        # central differences over 0.8 % of the weights: third derivatives remain
-        np.testing.assert_allclose(dmu, M @ step, atol=0.03 * np.abs(dmu).max())
-        np.testing.assert_allclose(dx, by_w @ step, atol=0.05 * np.abs(dx).max())
+        # central differences over 0.2 % of the weights: third derivatives remain
+        np.testing.assert_allclose(dmu, M @ step, atol=0.005 * np.abs(dmu).max())
+        np.testing.assert_allclose(dx, by_w @ step, atol=0.005 * np.abs(dx).max())
 
 
 def test_a_solve_is_deterministic_and_passes_no_better_gait_than_its_answer():

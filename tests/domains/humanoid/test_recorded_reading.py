@@ -137,7 +137,10 @@ DIALECTS = {
 @pytest.mark.parametrize("dialect", DIALECTS)
 def test_dialects_say_the_same(read, walk, dialect):
     person = read(*DIALECTS[dialect](walk))
-    assert legs_apart(person.gait, read(storage(walk)).gait) < 0.1
+    # a laboratory's file has no subtalar joint: a contact is found a sample elsewhere, and with it
+    # the period, by .6 %
+    bound = 0.2 if dialect == "clinical" else 0.1
+    assert legs_apart(person.gait, read(storage(walk)).gait) < bound
     assert person.speed == pytest.approx(GAIT.speed, rel=0.015)
 
 

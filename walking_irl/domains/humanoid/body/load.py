@@ -7,6 +7,7 @@ of its own it starts from the shipped ones (:mod:`~.gait.library`).
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from walking_irl.domains.humanoid.body.anatomy import (
     other_side,
     walker_of,
 )
+from walking_irl.domains.humanoid.body.variants import model_of, parted, variant
 from walking_irl.errors import InvalidInputError, reason
 from walking_irl.files import model_path
 
@@ -37,7 +39,8 @@ def load_walker(body: str | Path = "humanoid") -> Walker:
     """A shipped body by name, or the body of a model file; one object per process.
 
     Args:
-        body: "humanoid", "humanoid-planar", or the path of an MJCF file.
+        body: "humanoid", "humanoid-planar", or the path of an MJCF file; any of them in other
+            surroundings (:mod:`~.variants`).
 
     Raises:
         InvalidInputError: If there is no such body, or its model is not one that can walk here.
@@ -54,25 +57,30 @@ def body_of(body: str | Path) -> str:
     Raises:
         InvalidInputError: If there is no such body.
     """
-    if str(body) in SHIPPED:
-        return str(body)
+    body, around = parted(str(body))
+    if body in SHIPPED:
+        return variant(body, around)
     if not Path(body).is_file():
         raise InvalidInputError(
-            f"there is no body {str(body)!r}; choose from {', '.join(SHIPPED)} or give the path of "
+            f"there is no body {body!r}; choose from {', '.join(SHIPPED)} or give the path of "
             "an MJCF file"
         )
-    return str(Path(body).resolve())
+    return variant(str(Path(body).resolve()), around)
 
 
 @lru_cache
 def _load(body: str) -> Walker:
-    path = model_path(SHIPPED[body]) if body in SHIPPED else Path(body)
+    own, around = parted(body)
+    path = model_path(SHIPPED[own]) if own in SHIPPED else Path(own)
     try:
-        model = mujoco.MjModel.from_xml_path(str(path))
+        model = model_of(path, around)
     except ValueError as error:
         raise InvalidInputError(f"{path} is not a readable MJCF file: {reason(error)}") from error
     _check(model, path)
-    return walker_of(model, body, path.stem)
+    walker = walker_of(model, body, path.stem)
+    if own == body:
+        return walker
+    return replace(walker, mass=_load(own).mass, weight=_load(own).weight)
 
 
 def _check(model: mujoco.MjModel, path: Path) -> None:

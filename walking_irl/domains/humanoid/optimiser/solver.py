@@ -185,7 +185,11 @@ class GaitSolver:
         return Linearisation(self.problem, self.problem.evaluate(x))
 
     def sensitivity(
-        self, w: Array, lin: Linearisation, root: Array | None = None
+        self,
+        w: Array,
+        lin: Linearisation,
+        root: Array | None = None,
+        tether: Array | None = None,
     ) -> tuple[Array, Array, float] | None:
         r"""Sensitivities of an optimal gait to its weights, and how optimal it is.
 
@@ -193,6 +197,8 @@ class GaitSolver:
             w: Weights, shape (K,).
             lin: Linearisation at the gait.
             root: Multipliers of the root forces; None: what the penalty says.
+            tether: Of the solve that found the gait, shape (N nv + 2,), or None; with one the
+                decrement means nothing.
 
         Returns:
             d mu / d w = :math:`g^T (2 H)^{-1} g`, symmetric positive semi-definite, shape (K, K),
@@ -204,7 +210,7 @@ class GaitSolver:
         is_exact = self.problem.dynamics.reason is None
         matrix = half_hessian(lin.at(w, ROOT_PENALTY), self.structure, root, is_exact=is_exact)
         try:
-            return _sensitivity(w, lin, matrix.factor(UNDAMPED))
+            return _sensitivity(w, lin, matrix.factor(UNDAMPED, tether))
         except np.linalg.LinAlgError:
             return None
 

@@ -124,6 +124,31 @@ def feasible_gait(
     )
 
 
+def sensitivity(
+    spec: WalkerSpec,
+    found: Feasible,
+    shown: Gait,
+    w: Array,
+    *,
+    missing: Sequence[str] = (),
+    strength: float = STRENGTH,
+) -> Array | None:
+    """D mu / d w of the nearest gait, shape (K, K); None if it is no smooth minimum.
+
+    Args:
+        spec: Which body, and its costs.
+        found: What :func:`feasible_gait` found, with these arguments.
+        shown: The recorded gait.
+        w: Weights, shape (K,).
+        missing: Columns that the recording has not got.
+        strength: tau.
+    """
+    solver, to = solver_for(spec), closeness(spec.walker, shown, missing)
+    lin = solver.linearise(found.gait.to_vector())
+    known = solver.sensitivity(w, lin, tether=strength * to.weight)
+    return None if known is None else known[0]
+
+
 def check_habit(found: Feasible, accepted: bool = False) -> None:
     """Refuse a walk that the body cannot follow.
 
