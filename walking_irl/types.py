@@ -153,7 +153,7 @@ class Certainty(NamedTuple):
     """Half widths of the weights' intervals by cause, (K,) each; they add up."""
 
     from_noise: Array
-    """Of the expert's features: Student's quantile times ``standard_errors``."""
+    """Of the expert's features: ``standard_errors`` times Student's quantile for all at once."""
     from_gap: Array
     """What a sub-optimality of ``gap`` allows."""
     from_solver: Array

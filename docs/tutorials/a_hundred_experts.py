@@ -26,7 +26,7 @@ assert exact.weights_inside.value == 1.0
 # %%
 # Then a hundred that are known by twenty noisy measurements of what their policy earns. Intervals should
 # hold all weights of an expert at once in 95 of a hundred cases; the count itself is uncertain by two or
-# three, and the intervals are first-order in the noise.
+# three.
 
 domain, rng = LQR(3), np.random.default_rng(0)
 error, half = [], []
@@ -42,7 +42,7 @@ for _ in range(100):
 strain = np.array(error) / np.array(half)
 inside = (strain <= 1).all(axis=1)
 print(f"{inside.sum()} of {len(inside)} experts lie inside with all their weights")
-assert inside.sum() >= 88
+assert inside.sum() >= 90
 
 # %%
 # How far truths lie from the estimate, in half widths of their interval: beyond one they are outside.

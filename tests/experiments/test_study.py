@@ -53,7 +53,7 @@ def drawn(n, n_samples, spread=1.0, K=3, seed=0):
     """Outcomes whose errors follow Student's law exactly, times ``spread``."""
     rng = np.random.default_rng(seed)
     se, w = 0.01, np.full(K, 1 / K)
-    half = se * student.ppf(0.975, n_samples - 1)
+    half = se * student.ppf(1 - 0.025 / K, n_samples - 1)  # for all weights at once
     return [
         {
             "seed": i,
@@ -101,7 +101,20 @@ def test_a_side_that_the_simplex_cuts_off_is_no_narrower_than_the_other():
 
 
 def test_student_and_normal_quantiles_meet():
-    assert quantile(0.95, np.array([10**6])) == pytest.approx(1.959964, abs=1e-4)
+    many = np.array([10**6])
+    assert quantile(0.95, many) == pytest.approx(1.959964, abs=1e-4)
+    assert quantile(0.95, many, 5) == quantile(0.99, many)
+
+
+def test_intervals_of_all_weights_at_once_hold_at_their_level():
+    """4 standard errors of 2000 experts; weights are independent, so that Bonferroni is near."""
+    inside = scored(drawn(2000, 20)).inside.all(axis=1).mean()
+    assert inside == pytest.approx(0.95, abs=4 * np.sqrt(0.95 * 0.05 / 2000))
+
+
+def test_only_the_part_that_noise_explains_goes_with_the_level():
+    found = [{**o, "from_noise": [0.0, 0.0, 0.0]} for o in drawn(50, 20)]
+    assert len({share.value for share in calibration(scored(found)).values()}) == 1
 
 
 @pytest.fixture(scope="module")

@@ -5,8 +5,9 @@ Near its minimum at :math:`\hat w` the regret is
 weights; let :math:`C = U H^{-1} U^T`. Three things keep the expert's own weights away from
 :math:`\hat w`, and their half widths add up:
 
-* **noise** in its features, of covariance :math:`S`: :math:`t \sqrt{(C S C)_{jj}}` (theory D.2:
-  :math:`\delta w = C \, \delta\mu`), :math:`t` being Student's quantile;
+* **noise** in its features, of covariance :math:`S`: :math:`t \sqrt{(C S C)_{jj}}`, since
+  :math:`\delta w = C \, \delta\mu`; :math:`t` is Student's quantile for all K weights at once
+  (Bonferroni);
 * **its own sub-optimality** :math:`\delta_E = f(w_E)`: :math:`w_E` lies in the ellipsoid
   :math:`\{f \le \delta_E\}`, whose half widths are
   :math:`\sqrt{2 (\delta_E - f^*) C_{jj}}`. Of :math:`\delta_E` only :math:`f^* \le \delta_E` can be
@@ -139,7 +140,7 @@ def half_widths(outlook: Outlook, w: Array, level: Level, n_before: int) -> Cert
     gap = np.sqrt(2.0 * level.gap * stretch * variance)
     both = np.sqrt(2.0 * level.total * stretch * variance)
     return Certainty(
-        from_noise=bundle.quantile(1) * errors,
+        from_noise=bundle.quantile(bundle.K) * errors,
         from_gap=gap,
         from_solver=both - gap + offset,
         standard_errors=errors,

@@ -1,10 +1,11 @@
 """How often intervals hold the truth: containment, coverage by nominal level, binomial intervals.
 
-Intervals of a run are nominal 95 % ones. Those of another level are made from them: the part of a
-half width that comes from noise goes with Student's quantile; what an expert's possible
-sub-optimality allows is no matter of chance, and the same at every level: so are all intervals of
-an expert that is known exactly. Where a recorded expert's run does not tell the parts, the whole
-half width is scaled. Theory: Clopper and Pearson, Biometrika 26 (1934), for binomial intervals.
+Intervals of a run hold all K weights at once at 95 %. Those of one weight at a nominal level are
+made from them: the part of a half width that comes from noise goes with Student's quantile; what
+an expert's possible sub-optimality allows is no matter of chance, and the same at every level: so
+are all intervals of an expert that is known exactly. Where a recorded expert's run does not tell
+the parts, the whole half width is scaled. Binomial intervals are those of Clopper and Pearson,
+Biometrika 26 (1934).
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ Marks = NDArray[np.bool_]
 LEVELS = (0.5, 0.8, 0.9, 0.95, 0.99)
 """Nominal levels of a calibration."""
 REPORTED = 0.95
-"""Nominal level of a run's intervals."""
+"""Nominal level of a run's intervals, for all weights at once."""
 ROUNDING = 1e-9
 """By how much an interval may miss: what a report of one run grants as well."""
 
@@ -67,7 +68,7 @@ class Scored(NamedTuple):
     half: Array
     """Distance from w to the bound on the side of w_E; the wider side's where it is clipped."""
     inside: Marks
-    """Whether w_E lies inside its 95 % interval."""
+    """Whether w_E lies inside the run's interval."""
     statistical: Array
     """Part of the half width that comes from noise: none of an exact expert's."""
     n_samples: Array
@@ -89,30 +90,37 @@ def scored(outcomes: Sequence[Mapping[str, Any]]) -> Scored:
         error=np.abs(w - w_E),
         half=half,
         inside=(w_E >= low - ROUNDING) & (w_E <= high + ROUNDING),
-        statistical=np.where(n_samples[:, None] > 0, half, 0.0),
+        statistical=np.array([_from_noise(o, h) for o, h in zip(found, half, strict=True)]),
         n_samples=n_samples,
     )
 
 
-def quantile(level: float, n_samples: Array) -> Array:
-    """Student's two-sided quantile for means of so many rollouts."""
+def _from_noise(outcome: Mapping[str, Any], half: Array) -> Array:
+    """Part of one expert's half widths that comes from noise."""
+    if outcome["n_samples"] == 0:
+        return np.zeros_like(half)
+    told = outcome.get("from_noise")
+    return half if told is None else np.minimum(told, half)
+
+
+def quantile(level: float, n_samples: Array, n_weights: int = 1) -> Array:
+    """Student's two-sided quantile for means of so many rollouts, of so many weights at once."""
     df = np.maximum(n_samples - 1, 1)
-    found: Array = student.ppf(0.5 + level / 2, df)
+    found: Array = student.ppf(1.0 - (1.0 - level) / (2 * n_weights), df)
     return found
 
 
 def inside_at(level: float, found: Scored) -> Marks:
-    """Whether each truth lies inside the interval of a nominal level, (N, K)."""
-    if level == REPORTED:
-        return found.inside
-    q = quantile(level, found.n_samples) / quantile(REPORTED, found.n_samples)
+    """Whether each truth lies inside the interval of its own at a nominal level, (N, K)."""
+    n, K = found.n_samples, found.error.shape[1]
+    q = quantile(level, n) / quantile(REPORTED, n, K)
     half = found.half + (q[:, None] - 1.0) * found.statistical
     within: Marks = found.error <= half + ROUNDING
     return within
 
 
 def calibration(found: Scored) -> dict[float, Share]:
-    """Measured coverage of each nominal level, over all weights of all experts."""
+    """Measured coverage by one weight's intervals of each nominal level, all weights together."""
     return {level: pooled_share(inside_at(level, found)) for level in LEVELS}
 
 

@@ -69,6 +69,9 @@ def outcome_of(report: Report) -> dict[str, Any]:
         "intervals": last.intervals.tolist(),
         "least": least,
         "n_samples": report.expert.n_samples,
+        "from_noise": None
+        if (sure := report.summary.certainty) is None
+        else sure.from_noise.tolist(),
         "l1_error": report.l1_error,
         "loss": report.relative_loss(report.recovered_mu),
         "bracket": list(report.summary.bracket),

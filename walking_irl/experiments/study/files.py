@@ -18,13 +18,14 @@ from walking_irl.experiments.table import machine
 from walking_irl.files import write_file, write_json
 
 NOTES = (
-    "Inside: the ground-truth weight lies in its 95 % interval. An expert that could not be "
+    "Inside: the ground-truth weight lies in its interval; those of an expert are to hold all its "
+    "weights at once at 95 %. An expert that could not be "
     "recovered counts among the experts, as not inside.",
     "Shares have 95 % intervals by Clopper and Pearson; where the weights of all experts are taken "
     "together, an expert counts once, for its weights share their errors.",
-    "Nominal levels other than 95 %: the part of a half width that comes from noise is scaled by "
-    "the quantiles of Student's t; that of an expert's possible sub-optimality, and so all of "
-    "an exact expert's, is the same at every level.",
+    "Nominal levels are those of one weight: the part of a half width that comes from noise is "
+    "scaled by the quantiles of Student's t; that of an expert's possible sub-optimality, and so "
+    "all of an exact expert's, is the same at every level.",
     "Beyond half: truths farther from the recovered weight than half of the half width, on their "
     "side. Next to none would mean that intervals are wider than they need be.",
     "CPU seconds are those of one process, its expert included; machines differ.",
