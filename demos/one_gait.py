@@ -61,7 +61,7 @@ def record(path: Path, domain: Humanoid, gaits: dict[str, Gait]) -> None:
     """Eight cycles of each gait, one after the other."""
     stream, memory = open_stream()
     view, motion = world_of(domain)
-    stream.send_blueprint(motion_blueprint(view))
+    stream.send_blueprint(motion_blueprint(view, {}))
     stream.send_recording_name("six gaits")
     view.log_static(stream)
     first = 0
