@@ -36,8 +36,8 @@ def test_score_falls_linearly_outside_the_band():
 
 
 def test_reference_gait_walks_like_a_person():
-    """The prototype of this model scored .83 or more under all weights but extreme ones."""
-    assert score(metrics(gait_cycle(WALKER, REFERENCE))) > 0.85
+    """It scores .982; .97 leaves room for another solve of the same gait."""
+    assert score(metrics(gait_cycle(WALKER, REFERENCE))) > 0.97
 
 
 def test_reference_outscores_a_gait_with_frozen_arms_and_stiff_knees():
