@@ -34,7 +34,15 @@ extensions = [
     "sphinx.ext.mathjax",
     "sphinx_gallery.gen_gallery",
 ]
-exclude_patterns = ["_build", "tables", "studies.md", "faults.md", "tutorials/*.md", "tutorials/*.rst", "_generated/parts"]
+exclude_patterns = [
+    "_build",
+    "tables",
+    "studies.md",
+    "faults.md",
+    "tutorials/*.md",
+    "tutorials/*.rst",
+    "_generated/parts",
+]
 nitpicky = True
 html_theme = "furo"
 html_title = f"walking_irl {release}"

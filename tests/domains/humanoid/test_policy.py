@@ -177,3 +177,13 @@ def test_pushes_of_80_newton_are_survived_at_any_phase(walker, fine_policy, dire
         calm = rollout(walker, fine_policy, seconds=2.0)
         n = len(calm.q)
         assert np.abs(walk.q[:n] - calm.q).max() > 0.01, "the push must have been felt"
+
+
+@pytest.mark.parametrize("body", ["humanoid", "humanoid-planar"])
+def test_no_shipped_gait_asks_a_motor_for_more_than_it_gives(body):
+    """Else rollouts are of another walk: a calf's tendon must be let go of wherever the foot is."""
+    walker = load_walker(body)
+    low, high = walker.model.actuator_ctrlrange.T
+    for name, gait in load_gaits(body).items():
+        torque = tracking_policy(walker, gait).torque
+        assert (torque > 0.75 * low).all() and (torque < 0.75 * high).all(), name

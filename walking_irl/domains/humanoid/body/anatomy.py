@@ -20,7 +20,7 @@ from walking_irl.arrays import Array
 
 TORQUE_MARGIN = 1.5
 """Torques are clipped at this multiple of the strengths: the actuators' control range, less what it
-takes to let go of a tendon in the neutral posture."""
+takes to let go of a tendon at the joint's upper limit."""
 
 FLIPPED_JOINTS = (
     "root_y",
@@ -136,9 +136,11 @@ def walker_of(model: mujoco.MjModel, body: str, name: str) -> Walker:
 
 
 def _tendon_torque(model: mujoco.MjModel) -> Array:
-    """Torque of the tendons (cubic stiffness) in the neutral posture [Nm], shape (nu,)."""
+    """Torque of the tendons (cubic stiffness) at the joints' upper limits [Nm], shape (nu,)."""
     hinges = slice(model.nv - model.nu, None)
-    return np.asarray(model.jnt_stiffnesspoly[hinges, 1] * model.qpos_spring[hinges] ** 3)
+    limited = model.jnt_limited[hinges].astype(bool)
+    stretch = np.where(limited, model.jnt_range[hinges, 1], 0.0) - model.qpos_spring[hinges]
+    return np.asarray(-model.jnt_stiffnesspoly[hinges, 1] * stretch**3)
 
 
 def lowest_points(walker: Walker, q: Array) -> Array:
