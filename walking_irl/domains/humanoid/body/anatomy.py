@@ -20,7 +20,9 @@ from walking_irl.arrays import Array
 
 TORQUE_MARGIN = 1.5
 """Torques are clipped at this multiple of the strengths: the actuators' control range, less what it
-takes to let go of a tendon at the joint's upper limit."""
+takes to let go of a tendon that is stretched to LET_GO."""
+LET_GO = np.deg2rad(5.0)
+"""Angle up to which a motor overcomes its joint's tendon, with all its strength to spare [rad]."""
 
 FLIPPED_JOINTS = (
     "root_y",
@@ -136,10 +138,9 @@ def walker_of(model: mujoco.MjModel, body: str, name: str) -> Walker:
 
 
 def _tendon_torque(model: mujoco.MjModel) -> Array:
-    """Torque of the tendons (cubic stiffness) at the joints' upper limits [Nm], shape (nu,)."""
+    """Torque of the tendons (cubic stiffness) at the angle LET_GO [Nm], shape (nu,)."""
     hinges = slice(model.nv - model.nu, None)
-    limited = model.jnt_limited[hinges].astype(bool)
-    stretch = np.where(limited, model.jnt_range[hinges, 1], 0.0) - model.qpos_spring[hinges]
+    stretch = LET_GO - model.qpos_spring[hinges]
     return np.asarray(-model.jnt_stiffnesspoly[hinges, 1] * stretch**3)
 
 
