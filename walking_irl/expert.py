@@ -21,6 +21,22 @@ Bound = Literal["student", "bernstein", "hoeffding"]
 Trajectory = TypeVar("Trajectory")
 
 
+def student_quantile(confidence: float, n_samples: Array | int, n_tests: int = 1) -> Array:
+    """Student's two-sided quantile for means of n samples, and for so many intervals at once.
+
+    Args:
+        confidence: Probability that all intervals hold (Bonferroni), in (0, 1).
+        n_samples: Samples behind each mean, any shape.
+        n_tests: Number of intervals.
+
+    Returns:
+        The quantiles, of the shape of ``n_samples``.
+    """
+    df = np.maximum(np.asarray(n_samples) - 1, 1)
+    found: Array = np.asarray(stdtrit(df, 1.0 - (1.0 - confidence) / (2 * n_tests)))
+    return found
+
+
 def half_widths(
     returns: Array,
     *,
@@ -53,7 +69,7 @@ def half_widths(
         raise InvalidInputError("confidence must lie in (0, 1) and n_policies be positive")
     delta, deviation = 1.0 - confidence, returns.std(axis=0, ddof=1)
     if bound == "student":
-        quantile = float(stdtrit(m - 1, 1.0 - delta / (2 * K * n_policies)))
+        quantile = float(student_quantile(confidence, m, K * n_policies))
         widths: Array = quantile * deviation / math.sqrt(m)
         return widths
     if bound not in ("bernstein", "hoeffding"):

@@ -20,12 +20,12 @@ from walking_irl.experiments.study.coverage import (
     LEVELS,
     binomial_share,
     calibration,
-    quantile,
     scored,
     strain,
 )
 from walking_irl.experiments.study.files import to_markdown, write_study
 from walking_irl.experiments.study.result import Result
+from walking_irl.expert import student_quantile
 from walking_irl.run import session
 from walking_irl.run.setup import Setup
 
@@ -102,8 +102,8 @@ def test_a_side_that_the_simplex_cuts_off_is_no_narrower_than_the_other():
 
 def test_student_and_normal_quantiles_meet():
     many = np.array([10**6])
-    assert quantile(0.95, many) == pytest.approx(1.959964, abs=1e-4)
-    assert quantile(0.95, many, 5) == quantile(0.99, many)
+    assert student_quantile(0.95, many) == pytest.approx(1.959964, abs=1e-4)
+    assert student_quantile(0.95, many, 5) == student_quantile(0.99, many)
 
 
 def test_intervals_of_all_weights_at_once_hold_at_their_level():

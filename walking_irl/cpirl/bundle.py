@@ -7,11 +7,11 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from walking_irl.arrays import Array
 from walking_irl.cpirl.gauge import SAME, has_constant_sum
 from walking_irl.errors import EmptyPolyhedronError, InvalidInputError, SolverError
+from walking_irl.expert import student_quantile
 from walking_irl.geometry.game import Game, game_lp
 from walking_irl.geometry.polyhedron import WeightPolyhedron
 from walking_irl.types import Expert, Response
@@ -248,8 +248,8 @@ class Bundle:
 
     def quantile(self, n_tests: int) -> float:
         """Student's two-sided quantile for ``n_tests`` simultaneous intervals."""
-        df = max(self.expert.n_samples - 1, 1) if self.expert.n_samples else 10**6
-        return float(stdtrit(df, 1.0 - (1.0 - _CONFIDENCE) / (2 * n_tests)))
+        n = self.expert.n_samples or 10**6 + 1  # of a covariance alone: as good as known
+        return float(student_quantile(_CONFIDENCE, n, n_tests))
 
 
 def _checked(response: Response, K: int) -> Response:

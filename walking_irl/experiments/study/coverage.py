@@ -16,9 +16,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import beta
-from scipy.stats import t as student
 
 from walking_irl.arrays import Array
+from walking_irl.expert import student_quantile
 
 Marks = NDArray[np.bool_]
 
@@ -103,17 +103,10 @@ def _from_noise(outcome: Mapping[str, Any], half: Array) -> Array:
     return half if told is None else np.minimum(told, half)
 
 
-def quantile(level: float, n_samples: Array, n_weights: int = 1) -> Array:
-    """Student's two-sided quantile for means of so many rollouts, of so many weights at once."""
-    df = np.maximum(n_samples - 1, 1)
-    found: Array = student.ppf(1.0 - (1.0 - level) / (2 * n_weights), df)
-    return found
-
-
 def inside_at(level: float, found: Scored) -> Marks:
     """Whether each truth lies inside the interval of its own at a nominal level, (N, K)."""
     n, K = found.n_samples, found.error.shape[1]
-    q = quantile(level, n) / quantile(REPORTED, n, K)
+    q = student_quantile(level, n) / student_quantile(REPORTED, n, K)
     half = found.half + (q[:, None] - 1.0) * found.statistical
     within: Marks = found.error <= half + ROUNDING
     return within
