@@ -89,11 +89,7 @@ def cpirl(
             features.
     """
     probing = Probing(probe) if isinstance(probe, int | float) else probe
-    if bracket is not None and (mode != "minimise" or not bracket > 0.0):
-        raise InvalidInputError("a bracket is a positive number, for the minimise mode only")
-    asked = None if probing is None else probing.level
-    if not tol > 0.0 or max_solves < 1 or (asked is not None and not asked > 0.0):
-        raise InvalidInputError("tol, max_solves and probe must be positive")
+    _check_numbers(mode, tol, bracket, max_solves, probing)
     levels = levels_of(mode, tol)
     check_expert(expert)
     bundle = Bundle.of(expert, min_weight)
@@ -119,6 +115,17 @@ def cpirl(
         history.append(replace(iteration, status=decision.status if probes.is_over else Status.CUT))
         yield history[-1]
     yield from probes.run(forward, len(history))
+
+
+def _check_numbers(
+    mode: Mode, tol: float, bracket: float | None, max_solves: int, probing: Probing | None
+) -> None:
+    """Complain about arguments out of range."""
+    if bracket is not None and (mode != "minimise" or not bracket > 0.0):
+        raise InvalidInputError("a bracket is a positive number, for the minimise mode only")
+    asked = None if probing is None else probing.level
+    if not tol > 0.0 or max_solves < 1 or (asked is not None and not asked > 0.0):
+        raise InvalidInputError("tol, max_solves and probe must be positive")
 
 
 @dataclass(frozen=True)
