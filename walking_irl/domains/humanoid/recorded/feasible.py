@@ -107,19 +107,17 @@ def feasible_gait(
     tasks = [(spec, w, x, to, stages) for _, x, stages in legs]
     found = run_tasks(_follow, tasks, executor)
     ends = [(name, x) for (name, *_), (xs, _) in zip(legs, found, strict=True) for x in xs]
-    solver = solver_for(spec)
-    pull = [strength * to.squared(x) for _, x in ends]
-    costs = [solver.problem.evaluate(x).total_costs() for _, x in ends]
-    total = [float(w @ g) + p for g, p in zip(costs, pull, strict=True)]
-    best = int(np.argmin(total))
-    gait = Gait.from_vector(ends[best][1], len(spec.walker.joints))
+    problem = solver_for(spec).problem
+    evaluated = [(way, problem.evaluate(x), strength * to.squared(x)) for way, x in ends]
+    way, ev, pull = min(evaluated, key=lambda e: float(w @ e[1].total_costs()) + e[2])
+    gait = Gait.from_vector(ev.x, len(spec.walker.joints))
     return Feasible(
         gait=gait,
-        total_costs=costs[best],
-        pull=pull[best],
-        root=float(np.abs(solver.problem.evaluate(ends[best][1]).root).max()),
+        total_costs=ev.total_costs(),
+        pull=pull,
+        root=float(np.abs(ev.root).max()),
         degrees=degrees_apart(spec.walker, gait, shown),
-        way=ends[best][0],
+        way=way,
         iterations=sum(n for _, n in found),
     )
 
