@@ -11,11 +11,16 @@ from rich.console import Console
 from rich.table import Table
 
 from walking_irl.arrays import Array
-from walking_irl.cli.weights import parse_weights, show_weights
-from walking_irl.domains import WALKERS, load_walker_domain
-from walking_irl.domains.weights import normalised
+from walking_irl.cli.one_gait import (
+    add_png,
+    add_save,
+    add_walker,
+    asked_walker,
+    check_gait_files,
+    write_gait_files,
+)
 from walking_irl.errors import InvalidInputError
-from walking_irl.files import check_ending, check_outputs, write_file, write_json, write_png
+from walking_irl.files import check_ending, check_outputs, write_file, write_json
 from walking_irl.workers import workers
 
 
@@ -24,17 +29,16 @@ def add_parser(commands: Any) -> argparse.ArgumentParser:
     p: argparse.ArgumentParser = commands.add_parser(
         "gait", help="solve for the best gait under given weights"
     )
-    p.add_argument("--domain", default=WALKERS[0], help=f"{' or '.join(WALKERS)} (%(default)s)")
-    p.add_argument("--weights", required=True, metavar="W1,W2,...", help="one per objective")
+    add_walker(p)
     p.add_argument(
         "--seconds",
         type=float,
         default=10.0,
         help="length of the closed-loop rollout (%(default)s)",
     )
-    p.add_argument("--save", type=Path, metavar="FILE.npz|FILE.csv", help="write the gait cycle")
+    add_save(p)
     p.add_argument("--record", type=Path, metavar="FILE.rrd", help="record the rollout")
-    p.add_argument("--png", type=Path, metavar="FILE.png", help="draw a picture strip")
+    add_png(p)
     p.add_argument("--plot", type=Path, metavar="FILE.svg", help="draw its curves on the norms")
     p.add_argument("--json", type=Path, metavar="FILE.json", help="write the gait's figures")
     p.add_argument("--quiet", action="store_true", help="print nothing but errors")
@@ -43,20 +47,15 @@ def add_parser(commands: Any) -> argparse.ArgumentParser:
 
 def run(args: argparse.Namespace, console: Console) -> int:
     """``walking-irl gait``."""
-    from walking_irl.domains.humanoid.gait.files import save_gait
     from walking_irl.domains.humanoid.gait.realism import figures
 
-    check_ending(args.save, ".npz", ".csv")
+    check_gait_files(args)
     check_ending(args.record, ".rrd")
-    check_ending(args.png, ".png")
     check_ending(args.plot, ".svg")
     check_outputs([args.save, args.record, args.png, args.plot, args.json])
     if not (np.isfinite(args.seconds) and args.seconds > 0):
         raise InvalidInputError(f"seconds must be a positive number, got {args.seconds}")
-    domain = load_walker_domain(args.domain)
-    w = normalised(parse_weights(args.weights), domain.objectives)
-    if not args.quiet:
-        show_weights(w, console)
+    domain, w = asked_walker(args, console)
     with workers() as executor:
         response = domain.forward(w, executor)
     found = response.policy
@@ -67,12 +66,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
         **figures(domain.walker, found),
         "solver": dict(response.info),
     }
-    if args.save is not None:
-        save_gait(args.save, found, domain.walker)
-    if args.png is not None:
-        from walking_irl.domains.humanoid.gait.pictures import strip
-
-        write_png(args.png, strip(domain.walker, found))
+    write_gait_files(args, domain.walker, found)
     if args.plot is not None:
         write_file(args.plot, _curves(domain.walker, found).encode())
     if args.record is not None:

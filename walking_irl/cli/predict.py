@@ -11,11 +11,16 @@ from rich.console import Console
 from rich.table import Table
 
 from walking_irl.cli import DONE
-from walking_irl.cli.weights import parse_weights, show_weights
-from walking_irl.domains import WALKERS, load_walker_domain
-from walking_irl.domains.weights import normalised
+from walking_irl.cli.one_gait import (
+    add_png,
+    add_save,
+    add_walker,
+    asked_walker,
+    check_gait_files,
+    write_gait_files,
+)
 from walking_irl.errors import InvalidInputError
-from walking_irl.files import check_ending, check_outputs, write_json, write_png
+from walking_irl.files import check_outputs, write_json
 from walking_irl.workers import workers
 
 
@@ -24,15 +29,14 @@ def add_parser(commands: Any) -> argparse.ArgumentParser:
     p: argparse.ArgumentParser = commands.add_parser(
         "predict", help="the gait that the same weights give elsewhere"
     )
-    p.add_argument("--domain", default=WALKERS[0], help=f"{' or '.join(WALKERS)} (%(default)s)")
-    p.add_argument("--weights", required=True, metavar="W1,W2,...", help="one per objective")
+    add_walker(p)
     p.add_argument("--speed", type=float, metavar="M/S", help="of the walk (what the weights like)")
     p.add_argument(
         "--slope", type=float, default=0.0, metavar="DEG", help="of the ground, uphill positive"
     )
     p.add_argument("--load", type=float, default=0.0, metavar="KG", help="on the back")
-    p.add_argument("--save", type=Path, metavar="FILE.npz|FILE.csv", help="write the gait cycle")
-    p.add_argument("--png", type=Path, metavar="FILE.png", help="draw a picture strip")
+    add_save(p)
+    add_png(p)
     p.add_argument("--json", type=Path, metavar="FILE.json", help="write the figures")
     p.add_argument("--quiet", action="store_true", help="print nothing but errors")
     return p
@@ -41,28 +45,18 @@ def add_parser(commands: Any) -> argparse.ArgumentParser:
 def run(args: argparse.Namespace, console: Console) -> int:
     """``walking-irl predict``."""
     from walking_irl.domains.humanoid.body.variants import Surroundings
-    from walking_irl.domains.humanoid.gait.files import save_gait
     from walking_irl.domains.humanoid.prediction import predict
 
-    check_ending(args.save, ".npz", ".csv")
-    check_ending(args.png, ".png")
+    check_gait_files(args)
     check_outputs([args.save, args.png, args.json])
     if args.speed is not None and not (np.isfinite(args.speed) and args.speed > 0):
         raise InvalidInputError(f"speed must be a positive number, got {args.speed}")
     around = Surroundings(args.slope, args.load)
-    domain = load_walker_domain(args.domain)
-    w = normalised(parse_weights(args.weights), domain.objectives)
-    if not args.quiet:
-        show_weights(w, console)
+    domain, w = asked_walker(args, console)
     with workers() as executor:
         level = predict(domain.spec, w, Surroundings(), executor=executor)
         there = predict(domain.spec, w, around, args.speed, executor, level=level)
-    if args.save is not None:
-        save_gait(args.save, there.gait, there.spec.walker)
-    if args.png is not None:
-        from walking_irl.domains.humanoid.gait.pictures import strip
-
-        write_png(args.png, strip(there.spec.walker, there.gait))
+    write_gait_files(args, there.spec.walker, there.gait)
     content = {
         "objectives": [o.name for o in domain.objectives],
         "w": w.tolist(),
