@@ -10,10 +10,11 @@ from rich.markup import escape
 from rich.table import Table
 
 from walking_irl.cli import DONE
+from walking_irl.cli.side_by_side import workers_for
+from walking_irl.domains import load
 from walking_irl.errors import InvalidInputError
 from walking_irl.files import check_outputs, write_json
 from walking_irl.run.setup import HORIZON, TRAJECTORIES, Setup
-from walking_irl.workers import workers
 
 if TYPE_CHECKING:
     from walking_irl.run.by_method import MethodReport
@@ -58,10 +59,11 @@ def run(args: argparse.Namespace, given: dict[str, Any], console: Console) -> in
         raise InvalidInputError(f"{', '.join(own)}: CPIRL only, leave out with --method")
     check_outputs([args.json], inputs=[given.get("demonstration")])
     horizon = HORIZON if args.horizon is None else args.horizon
-    with workers() as executor:
+    setup = Setup(**given)
+    with workers_for(load(setup.domain)) as executor:
         report = recover_by(
             args.method,
-            Setup(**given),
+            setup,
             n_trajectories=args.trajectories,
             horizon=horizon,
             executor=executor,

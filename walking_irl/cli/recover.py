@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import fields, replace
 from itertools import count
 from pathlib import Path
@@ -13,10 +12,11 @@ from typing import Any
 from rich.console import Console
 
 from walking_irl.cli import DONE, FAILED, INTERRUPTED, by_method, walk
+from walking_irl.cli.side_by_side import workers_for
 from walking_irl.cli.terminal import Terminal, show_report
 from walking_irl.cli.weights import parse_weights
 from walking_irl.domains import DOMAINS, load
-from walking_irl.domains.contract import EXPERTS, Option
+from walking_irl.domains.contract import EXPERTS, Domain, Option
 from walking_irl.errors import InvalidInputError, WalkingIRLError
 from walking_irl.files import check_ending, check_outputs, write_file, write_json
 from walking_irl.geometry.centres import CENTRES
@@ -25,7 +25,7 @@ from walking_irl.run.checkpoint import Checkpoint, load_checkpoint
 from walking_irl.run.report import Report
 from walking_irl.run.setup import Setup
 from walking_irl.types import MODES
-from walking_irl.workers import interrupts_held, workers
+from walking_irl.workers import interrupts_held
 
 ALSO_WHEN_RESUMED = ("record", "checkpoint", "max_solves")
 """What a resumed run may be told anew."""
@@ -162,7 +162,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
         console.print(f"{setup.domain}: {source} the expert ...")
     n_known = 0 if before is None else len(before.answers)
     terminal = Terminal(console, rollouts, n_known, args.quiet)
-    report = _recovered(setup, before, terminal, domain.defaults.needs_workers)
+    report = _recovered(setup, before, terminal, domain)
     failure = _write(report, args) or report.failed_write
     show_report(report, console, terminal.rollouts_written)
     if failure is not None:
@@ -191,12 +191,12 @@ def _write(report: Report, args: argparse.Namespace) -> WalkingIRLError | None:
 
 
 def _recovered(
-    setup: Setup, before: Checkpoint | None, terminal: Terminal, needs_workers: bool
+    setup: Setup, before: Checkpoint | None, terminal: Terminal, domain: Domain
 ) -> Report:
     """The run; Ctrl-C while its workers end comes too late to take its result away."""
     report = None
     try:
-        with workers() if needs_workers else nullcontext() as executor, terminal:
+        with workers_for(domain) as executor, terminal:
             report = session.run(
                 setup,
                 resumed=before,

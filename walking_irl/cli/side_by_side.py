@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from concurrent.futures import Executor
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any
 
+from walking_irl.domains.contract import Domain
 from walking_irl.workers import workers
 
 
@@ -17,6 +18,11 @@ def add_scheduler(group: Any) -> None:
         metavar="tcp://HOST:PORT",
         help="run on the workers of that Dask scheduler, not on this machine's cores",
     )
+
+
+def workers_for(domain: Domain) -> AbstractContextManager[Executor | None]:
+    """Worker processes, or none where a domain's solves take less time than to start them."""
+    return workers() if domain.defaults.needs_workers else nullcontext()
 
 
 @contextmanager
