@@ -36,6 +36,7 @@ UNREADABLE = (
     BadZipFile,
     zlib.error,
 )
+"""What files raise that are no archives of arrays, or hold others than were meant."""
 
 
 def read_arrays(path: Path) -> dict[str, Any]:

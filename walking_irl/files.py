@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import json
 import math
 import os
-import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,20 +18,6 @@ from walking_irl.errors import InvalidInputError, WalkingIRLError
 from walking_irl.workers import interrupts_held
 
 _PACKAGE = Path(__file__).resolve().parent
-
-UNREADABLE = (
-    OSError,
-    ValueError,
-    EOFError,
-    TypeError,
-    AttributeError,
-    KeyError,
-    NotImplementedError,
-    BadZipFile,
-    csv.Error,
-    zlib.error,
-)
-"""What NumPy and csv raise on files that they cannot read; an .npy named .npz is one of them."""
 
 
 def model_path(name: str) -> Path:

@@ -15,12 +15,12 @@ from typing import Any, get_type_hints
 
 import numpy as np
 
-from walking_irl.archives import read_arrays
+from walking_irl.archives import UNREADABLE, read_arrays
 from walking_irl.arrays import Array
 from walking_irl.domains import load
 from walking_irl.domains.contract import Demonstration, Domain, Truth, settings
 from walking_irl.errors import InvalidInputError, reason
-from walking_irl.files import UNREADABLE, to_plain, write_arrays
+from walking_irl.files import to_plain, write_arrays
 from walking_irl.run.setup import Setup
 from walking_irl.types import Expert, Forward, Response
 from walking_irl.versions import versions
@@ -116,7 +116,7 @@ def load_checkpoint(path: Path) -> Checkpoint:
     arrays = read_arrays(path)
     try:
         return _unpacked(arrays)
-    except (*UNREADABLE, IndexError, InvalidInputError) as error:
+    except (*UNREADABLE, AttributeError, IndexError, InvalidInputError) as error:
         raise InvalidInputError(
             f"{path} is not a run that this version can resume ({reason(error)}); give the "
             "checkpoint that walking-irl recover wrote beside its recording"
