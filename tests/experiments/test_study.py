@@ -113,8 +113,21 @@ def test_intervals_of_all_weights_at_once_hold_at_their_level():
 
 
 def test_only_the_part_that_noise_explains_goes_with_the_level():
-    found = [{**o, "from_noise": [0.0, 0.0, 0.0]} for o in drawn(50, 20)]
+    none = [0.0, 0.0, 0.0]
+    found = [{**o, "parts": {"noise": none, "gap": none, "solver": none}} for o in drawn(50, 20)]
     assert len({share.value for share in calibration(scored(found)).values()}) == 1
+
+
+def test_experts_that_lie_inside_without_the_part_from_sub_optimality_are_counted():
+    parts = {"noise": [0.01] * 3, "gap": [0.5] * 3, "solver": [0.02] * 3}
+    wide = [[0.0, 1.0]] * 3
+    found = [{**o, "parts": parts, "intervals": wide, "w": [0.3, 0.3, 0.4]} for o in drawn(3, 20)]
+    for outcome, off in zip(found, (0.0, 0.029, 0.031), strict=True):
+        outcome["w_expert"] = [0.3 + off, 0.3 - off, 0.4]
+    result = Result(LQR, tuple(found))
+    assert result.inside_if_vouched.value == pytest.approx(2 / 3)
+    assert result.experts_inside.value == 1.0
+    assert result.spreads["of it from the solver"] == pytest.approx((0.02, 0.02, 0.02))
 
 
 @pytest.fixture(scope="module")
@@ -140,6 +153,8 @@ def test_an_outcome_is_that_of_the_command_that_repeats_it(six):
     report = session.run(replace(LQR, seed=4))
     assert outcome["w"] == report.w.tolist() and outcome["status"] == report.status
     assert outcome["l1_error"] == report.l1_error
+    widths = np.sum([outcome["parts"][part] for part in ("noise", "gap", "solver")], axis=0)
+    assert report.summary.certainty.half_widths == pytest.approx(widths)
     assert outcome["solves"] + outcome["probes"] == len(report.iterations)
 
 

@@ -99,8 +99,8 @@ def _from_noise(outcome: Mapping[str, Any], half: Array) -> Array:
     """Part of one expert's half widths that comes from noise."""
     if outcome["n_samples"] == 0:
         return np.zeros_like(half)
-    told = outcome.get("from_noise")
-    return half if told is None else np.minimum(told, half)
+    parts = outcome.get("parts")
+    return half if parts is None else np.minimum(parts["noise"], half)
 
 
 def inside_at(level: float, found: Scored) -> Marks:

@@ -10,10 +10,12 @@ from walking_irl.errors import WalkingIRLError
 from walking_irl.run import session
 from walking_irl.run.report import Report
 from walking_irl.run.setup import Setup
-from walking_irl.types import Rule
+from walking_irl.types import Certainty, Rule
 
 FILES = ("record", "checkpoint", "demonstration", "weights")
 """Fields of a setup that an expert of a study has not."""
+PARTS = ("noise", "gap", "solver")
+"""Of a half width: from noise, from the expert's possible sub-optimality, from the solver."""
 FAILED = "failed"
 """Ending of an expert that could not be made, or whose learner failed at once."""
 
@@ -69,9 +71,7 @@ def outcome_of(report: Report) -> dict[str, Any]:
         "intervals": last.intervals.tolist(),
         "least": least,
         "n_samples": report.expert.n_samples,
-        "from_noise": None
-        if (sure := report.summary.certainty) is None
-        else sure.from_noise.tolist(),
+        "parts": _parts(report.summary.certainty),
         "l1_error": report.l1_error,
         "loss": report.relative_loss(report.recovered_mu),
         "bracket": list(report.summary.bracket),
@@ -82,3 +82,10 @@ def outcome_of(report: Report) -> dict[str, Any]:
         "probes": sum(it.rule is Rule.PROBE for it in report.iterations),
         "error": report.failure or None,
     }
+
+
+def _parts(certainty: Certainty | None) -> dict[str, list[float]] | None:
+    """Half widths by cause; None where a run has no model of its regret."""
+    if certainty is None:
+        return None
+    return {part: getattr(certainty, f"from_{part}").tolist() for part in PARTS}

@@ -13,6 +13,7 @@ import numpy as np
 from walking_irl.arrays import Array
 from walking_irl.experiments.study.command import recover_command
 from walking_irl.experiments.study.coverage import (
+    ROUNDING,
     Scored,
     Share,
     binomial_share,
@@ -25,6 +26,12 @@ from walking_irl.run.setup import Setup
 
 QUANTILES = (0.5, 0.9, 1.0)
 """Of errors, half widths, solves and seconds; the last is the largest."""
+CAUSES = {
+    "noise": "from noise",
+    "gap": "from the expert's possible sub-optimality",
+    "solver": "from the solver",
+}
+"""Parts of a half width."""
 N_WORST = 3
 
 
@@ -97,6 +104,17 @@ class Result:
         return pooled_share(strain(self.scored) > 0.5)
 
     @property
+    def inside_if_vouched(self) -> Share:
+        """Experts whose weights would all lie inside had they been taken for optimal."""
+        told = [
+            np.abs(np.subtract(o["w"], o["w_expert"]))
+            <= np.add(o["parts"]["noise"], o["parts"]["solver"]) + ROUNDING
+            for o in self.recovered
+            if o.get("parts")
+        ]
+        return binomial_share(sum(bool(hit.all()) for hit in told), len(told))
+
+    @property
     def successes(self) -> Share:
         """Runs that end with an answer."""
         return binomial_share(sum(bool(o.get("is_success")) for o in self.outcomes), self.n)
@@ -132,7 +150,9 @@ class Result:
             ("CPU seconds", "cpu_seconds"),
         )
         found = {title: quantiles(self._column(name)) for title, name in named}
-        return {"half width of a weight": quantiles(self._half_widths.ravel()), **found}
+        whole = {"half width of a weight": quantiles(self._half_widths.ravel())}
+        parts = {f"of it {what}": quantiles(self._part(name)) for name, what in CAUSES.items()}
+        return {**whole, **parts, **found}
 
     @property
     def endings(self) -> list[tuple[str, int, str]]:
@@ -168,6 +188,11 @@ class Result:
         bounds = np.array([o["intervals"] for o in self.recovered]).reshape(-1, K, 2)
         half: Array = np.diff(bounds, axis=2)[:, :, 0] / 2
         return half
+
+    def _part(self, name: str) -> Array:
+        """One part of all weights' half widths, of runs that tell it."""
+        told = [o["parts"][name] for o in self.recovered if o.get("parts")]
+        return np.array(told).ravel()
 
     def _column(self, name: str) -> Array:
         return np.array([o[name] for o in self.outcomes if o.get(name) is not None], dtype=float)
