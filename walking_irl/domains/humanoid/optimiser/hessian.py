@@ -116,7 +116,8 @@ def _add_moving(assembly: Assembly, at: Weighted, pairs: Pairs, numbers: Array) 
     C = pairs.mm.dense(numbers)
     i = np.arange(pairs.knots.n_root)
     C[:, i, i] += at.factors.root[0] ** 2
-    X = (0.5 * C) @ rows
+    own = 0.5 * C.diagonal(axis1=1, axis2=2)[..., None]
+    X = own * rows if pairs.is_diagonal else (0.5 * C) @ rows
     pairs.mu.add(numbers, X)
     left, right = assembly.windows.columns(rows), assembly.windows.columns(X, 4)
     left.close()
