@@ -26,8 +26,9 @@ if TYPE_CHECKING:
 RESTS_ON = (
     "5. What it rests on: one body with these objectives for everybody (the recording is "
     "scaled to its legs); of all gaits as near to the recording, the one that is cheapest for the "
-    "weights; joint angles alone, forces are compared only; habits, pain and muscles that the body "
-    "has not got count as weights."
+    "weights; of weights that the walk leaves open, those nearer to the reference; vertical forces "
+    "where they were measured, else joint angles alone; habits, pain and muscles that the body has "
+    "not got count as weights."
 )
 
 
@@ -123,10 +124,9 @@ def _explain(
 ) -> Answer:
     from walking_irl.domains.humanoid.recorded.feasible import check_habit
     from walking_irl.domains.humanoid.spec import HUMANOID
-    from walking_irl.run.joint import Walk
     from walking_irl.run.walk import explain, nearest
 
-    walks = [Walk(p.gait, p.missing) for p in (person, *trials)]
+    walks = [p.walk for p in (person, *trials)]
     names = escape(", ".join(p.name for p in person.sources))
     _say(
         f"{names}: {person.speed:.2f} m/s; looking for the nearest gait of the body ...",
@@ -176,7 +176,7 @@ def _show(answer: Answer, spec: Any, console: Console) -> None:
 
 def _weights(answer: Answer, spec: Any) -> Table:
     found = answer.found
-    table = Table("objective", "weight", "half width", "of it: slack", "starts", "trials")
+    table = Table("objective", "weight", "half width", "of it: walk", "starts", "trials")
     rows = zip(found.w, found.half, found.allowed, found.starts, found.trials, strict=True)
     for objective, numbers in zip(spec.stack.objectives, rows, strict=True):
         table.add_row(objective.name, *(f"{v:.3f}" for v in numbers))
@@ -206,7 +206,7 @@ def _record(path: Path, answer: Answer, spec: Any) -> None:
 
 
 def _forces(answer: Answer, spec: Any) -> str:
-    """How far vertical forces are from measured ones, which no weight has seen."""
+    """How far vertical forces are from measured ones, which the nearest gait was drawn to."""
     from walking_irl.run.walk_report import force_apart
 
     force = answer.person.force
