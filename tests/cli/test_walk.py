@@ -12,7 +12,7 @@ from walking_irl.domains.humanoid.body.load import load_walker
 from walking_irl.domains.humanoid.costs.defaults import REFERENCE_WEIGHTS
 from walking_irl.domains.humanoid.gait.library import load_gaits
 from walking_irl.domains.humanoid.recorded.feasible import Feasible
-from walking_irl.recording.reader import Recording
+from walking_irl.recording.reader import Recording, inspect_recording
 from walking_irl.run import walk as module
 
 WALKER = load_walker()
@@ -94,12 +94,16 @@ def test_a_person_s_answer_comes_in_its_order(walked, monkeypatch, capsys, tmp_p
     out = capsys.readouterr().out
     places = [out.index(f"\n{k}. ") for k in range(1, 6)]
     assert places == sorted(places) and "w.mot against w.mot" in out
-    drawn = Recording(tmp_path / "w.rrd").entities
-    for who in ("walker", "expert", "nearest"):
-        assert any(e.startswith(f"/world/{who}/") for e in drawn)
+    recording = Recording(tmp_path / "w.rrd")
+    for who in ("/world/walker", "/world/expert", "/world/nearest", "/polyhedron", "/norms/knee"):
+        assert any(e.startswith(who) for e in recording.entities), who
+    assert "# What does this person walk for?" in recording.summary
+    assert "half width" in recording.summary and "most for it" in recording.summary
+    known = inspect_recording(tmp_path / "w.rrd")
     person = json.loads((tmp_path / "out.json").read_text())["people"][0]
     low, high = person["suboptimality"]
     assert 0 <= low <= high < 0.02 and person["nearest"]["sagittal"] < 2.0
     w, half = np.array(person["w"]), np.array(person["half_widths"])
+    assert known["w"] == pytest.approx(w) and known["iterations"] >= 1
     assert w.sum() == pytest.approx(1) and (half >= module.NARROWEST).all()
     assert np.all(np.abs(w - REFERENCE_WEIGHTS) <= half)

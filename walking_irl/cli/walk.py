@@ -184,25 +184,29 @@ def _weights(answer: Answer, spec: Any) -> Table:
 
 
 def _record(path: Path, answer: Answer, spec: Any) -> None:
-    """Three walkers: recorded, best for the weights, nearest; of the first person."""
-    from walking_irl.domains.humanoid.gait.gait import cycle_motion
-    from walking_irl.recording import record_motion
-    from walking_irl.recording.views.motion import periodic_rollout
-    from walking_irl.recording.views.people import PersonView
+    """The first person's answer, as a recording."""
+    from walking_irl.run.walk_film import record_explanation
 
-    end, walker = answer.found.end, spec.walker
-    shown, near, best = (
-        periodic_rollout(*cycle_motion(g, walker.mirror), g.timestep, 2 * g.step_length)
-        for g in (answer.person.gait, end.near.gait, end.gait)
-    )
-    view = PersonView(walker.model, shown, near)
+    found, near = answer.found, answer.found.end.near
+    low, high = (100 * b for b in found.bracket)
     rows = [
         f"| {o.name} | {w:.3f} | {h:.3f} |"
-        for o, w, h in zip(spec.stack.objectives, end.w, answer.found.half, strict=True)
+        for o, w, h in zip(spec.stack.objectives, found.w, found.half, strict=True)
     ]
-    head = ["| objective | weight | half width |", "|---|---|---|"]
-    text = "\n".join([view.describe() + ".", "", *head, *rows, "", RESTS_ON[3:]])
-    record_motion(path, view, best, title=answer.name, text=text)
+    text = "\n".join(
+        [
+            f"The body comes within **{near.sagittal:.1f} degrees** of the recording at hips, "
+            f"knees and ankles. Such a walk costs **{low:.1f} to {high:.1f} %** more than the best "
+            "one for any weights. The weights that speak most for it:",
+            "",
+            "| objective | weight | half width |",
+            "|---|---|---|",
+            *rows,
+            "",
+            RESTS_ON[3:],
+        ]
+    )
+    record_explanation(path, spec, answer.person, found, text)
 
 
 def _forces(answer: Answer, spec: Any) -> str:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from walking_irl.domains.humanoid.spec import WalkerSpec
 from walking_irl.geometry.game import game_lp
 from walking_irl.run.joint import LEAST_GAP, OBSERVATIONS, Fit, Point, joint_fit
 from walking_irl.run.remembered import Remembered
-from walking_irl.types import Expert
+from walking_irl.types import Expert, Iteration
 from walking_irl.workers import run_tasks
 
 BRACKET = 0.004
@@ -45,6 +46,7 @@ class Explanation:
         bracket: How much better the nearest gait could be, relative to its cost: least regret of
             any weights, lower and upper bound.
         solves: Forward solves of the bracket.
+        history: Its iterations, whose polyhedra close in on the weights of least regret.
         half: Half widths of the weights, shape (K,): root of the sum of squares of the parts that
             follow; at least NARROWEST.
         allowed: What the walk and the spread of weights among walkers leave open at 95 %, and the
@@ -58,6 +60,7 @@ class Explanation:
     fit: Fit
     bracket: tuple[float, float]
     solves: int
+    history: tuple[Iteration, ...]
     half: Array
     allowed: Array
     starts: Array
@@ -128,7 +131,7 @@ def explain(
     end = fit.last
     at_trials = [(spec, t, end.w, end.near, near.total_costs) for t in trials]
     single: list[Fit] = run_tasks(joint_fit, at_trials, executor)
-    bracket, solves = bracketed(spec, fit)
+    bracket, solves, history = bracketed(spec, fit)
     others = tuple(f.last for f in found if f is not fit)
     by_start = _farthest(end.w, [p.w for p in others])
     by_trial = _farthest(end.w, [f.last.w for f in single])
@@ -138,6 +141,7 @@ def explain(
         fit=fit,
         bracket=bracket,
         solves=solves,
+        history=history,
         half=np.maximum(half, NARROWEST),
         allowed=allowed,
         starts=by_start,
@@ -163,8 +167,17 @@ def _farthest(w: Array, others: Sequence[Array]) -> Array:
     return np.asarray(np.abs(np.array([w, *others]) - w).max(axis=0))
 
 
-def bracketed(spec: WalkerSpec, fit: Fit) -> tuple[tuple[float, float], int]:
-    """Least regret of the nearest gait: bounds relative to its cost, and the solves that they took.
+class Bracketed(NamedTuple):
+    """How much better a gait could be."""
+
+    bounds: tuple[float, float]
+    """Of its least regret, relative to its cost."""
+    solves: int
+    history: tuple[Iteration, ...]
+
+
+def bracketed(spec: WalkerSpec, fit: Fit) -> Bracketed:
+    """Least regret of the nearest gait, relative to its cost.
 
     Args:
         spec: Which body, and its costs.
@@ -189,4 +202,5 @@ def bracketed(spec: WalkerSpec, fit: Fit) -> tuple[tuple[float, float], int]:
     upper = float(((asked @ policies.T).max(axis=1) - asked @ mu).min())
     lower = -float(game_lp(policies - mu, MIN_WEIGHT).value)
     upper = max(upper, 0.0)
-    return (min(max(lower, 0.0), upper) / end.cost, upper / end.cost), forward.solves
+    bounds = (min(max(lower, 0.0), upper) / end.cost, upper / end.cost)
+    return Bracketed(bounds, forward.solves, tuple(history))
