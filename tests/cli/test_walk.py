@@ -1,10 +1,13 @@
 """``recover --walk``: what it refuses, and a person's answer from file to table."""
 
 import json
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from person_files import recording, storage
+from rich.console import Console
 
 from walking_irl.cli import walk as command
 from walking_irl.cli.main import main
@@ -12,6 +15,7 @@ from walking_irl.domains.humanoid.body.load import load_walker
 from walking_irl.domains.humanoid.costs.defaults import REFERENCE_WEIGHTS
 from walking_irl.domains.humanoid.gait.library import load_gaits
 from walking_irl.domains.humanoid.recorded.feasible import Feasible
+from walking_irl.domains.humanoid.spec import HUMANOID
 from walking_irl.recording.reader import Recording, inspect_recording
 from walking_irl.run import walk as module
 
@@ -100,10 +104,29 @@ def test_a_person_s_answer_comes_in_its_order(walked, monkeypatch, capsys, tmp_p
     assert "# What does this person walk for?" in recording.summary
     assert "half width" in recording.summary and "most for it" in recording.summary
     known = inspect_recording(tmp_path / "w.rrd")
-    person = json.loads((tmp_path / "out.json").read_text())["people"][0]
+    content = json.loads((tmp_path / "out.json").read_text())
+    (comparison,) = content["comparisons"]
+    assert comparison["people"] == ["w.mot", "w.mot"] and not any(comparison["beyond"])
+    assert "differ in no weight beyond" in out
+    person = content["people"][0]
     low, high = person["suboptimality"]
     assert 0 <= low <= high < 0.02 and person["nearest"]["sagittal"] < 2.0
     w, half = np.array(person["w"]), np.array(person["half_widths"])
     assert known["w"] == pytest.approx(w) and known["iterations"] >= 1
     assert w.sum() == pytest.approx(1) and (half >= module.NARROWEST).all()
     assert np.all(np.abs(w - REFERENCE_WEIGHTS) <= half)
+
+
+def test_weights_that_differ_beyond_their_half_widths_are_named(capsys):
+    """Two people of made-up answers: only the time differs by more than both half widths."""
+
+    def answer(name, w, half):
+        person = SimpleNamespace(sources=(Path(name),))
+        return command.Answer(person, None, SimpleNamespace(w=np.array(w), half=np.array(half)))
+
+    a = answer("a.mot", [0.2, 0.1, 0.1, 0.1, 0.1, 0.4], [0.06] * 6)
+    b = answer("b.mot", [0.3, 0.15, 0.1, 0.1, 0.1, 0.25], [0.08] * 6)
+    command._compare(a, b, HUMANOID, Console(width=80))
+    out = capsys.readouterr().out
+    assert "a.mot against b.mot" in out and "They differ in time, beyond" in out
+    assert [line.split("│")[1].strip() for line in out.splitlines() if "yes" in line] == ["time"]

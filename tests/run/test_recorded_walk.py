@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
+from walking_irl.domains.humanoid.body.variants import Surroundings
 from walking_irl.domains.humanoid.costs.defaults import REFERENCE_WEIGHTS
 from walking_irl.domains.humanoid.gait.gait import Gait
-from walking_irl.domains.humanoid.learner import search
+from walking_irl.domains.humanoid.learner import search, solver_for
+from walking_irl.domains.humanoid.prediction import Prediction, predict
 from walking_irl.domains.humanoid.recorded.closeness import Walk, closeness, degrees_apart
 from walking_irl.domains.humanoid.recorded.feasible import feasible_gait, sensitivity
 from walking_irl.domains.humanoid.spec import PLANAR
@@ -135,6 +137,26 @@ def test_half_widths_hold_the_parts_that_they_name_and_are_never_too_narrow(walk
     assert 0 <= low <= high <= low + BRACKET + 1e-9 and high < 0.01 and found.solves <= MAX_SOLVES
     content = explanation_json(found, walk.shown)
     assert content["w"] == found.w.tolist() and len(content["intervals"]) == 6
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("around", "faster"),
+    [(Surroundings(slope=2.862), None), (Surroundings(load=10.0), None), (Surroundings(), 1.08)],
+    ids=["5 % uphill", "a pack", "another speed"],
+)
+def test_weights_recovered_on_the_flat_predict_the_walker_elsewhere(fit, truth, around, faster):
+    """Within 1 % of its cost there, from a noisy recording of its usual walk."""
+    speed = None if faster is None else faster * truth.speed
+    there, guess = (
+        predict(PLANAR, w, around, speed, level=Prediction(PLANAR, gait, np.zeros(6), float(w[-1])))
+        for w, gait in ((TRUTH, truth), (fit.last.w, fit.last.gait))
+    )
+    of_truth, of_guess = (float(TRUTH @ p.total_costs) for p in (there, guess))
+    assert 0.999 * of_truth < of_guess < 1.01 * of_truth
+    if speed is None:  # what they predict is that the walk changes: its usual gait costs more there
+        usual = solver_for(there.spec).problem.evaluate(truth.to_vector()).total_costs()
+        assert of_guess < 0.9 * float(TRUTH @ usual)
 
 
 def test_starting_weights_are_far_apart():

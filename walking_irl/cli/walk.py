@@ -226,16 +226,27 @@ def _forces(answer: Answer, spec: Any) -> str:
     )
 
 
+def _difference(a: Answer, b: Answer) -> tuple[Any, Any]:
+    """Difference of two people's weights, and its half widths."""
+    return a.found.w - b.found.w, np.hypot(a.found.half, b.found.half)
+
+
 def _compare(a: Answer, b: Answer, spec: Any, console: Console) -> None:
     """Which weights of two people differ beyond what is known."""
-    apart = a.found.w - b.found.w
-    known = np.hypot(a.found.half, b.found.half)
-    beyond = np.abs(apart) > known
+    apart, known = _difference(a, b)
     console.print(f"\n[bold]{escape(a.name)} against {escape(b.name)}[/bold]")
     table = Table("objective", "difference", "half width", "beyond it")
-    for o, d, h, is_real in zip(spec.stack.objectives, apart, known, beyond, strict=True):
-        table.add_row(o.name, f"{d:+.3f}", f"{h:.3f}", "yes" if is_real else "no")
+    names = [o.name for o in spec.stack.objectives]
+    beyond = np.abs(apart) > known
+    for name, d, h, is_real in zip(names, apart, known, beyond, strict=True):
+        table.add_row(name, f"{d:+.3f}", f"{h:.3f}", "yes" if is_real else "no")
     console.print(table)
+    differ = [n for n, is_real in zip(names, beyond, strict=True) if is_real]
+    console.print(
+        f"They differ in {', '.join(differ)}, beyond what is known."
+        if differ
+        else "They differ in no weight beyond what is known."
+    )
 
 
 def _to_json(answers: Sequence[Answer], spec: Any) -> dict[str, Any]:
@@ -247,6 +258,16 @@ def _to_json(answers: Sequence[Answer], spec: Any) -> dict[str, Any]:
         "objectives": [o.name for o in spec.stack.objectives],
         "people": [
             {"read": to_json(a.person), **explanation_json(a.found, a.person.gait)} for a in answers
+        ],
+        "comparisons": [
+            {
+                "people": [a.name, b.name],
+                "difference": apart.tolist(),
+                "half_widths": known.tolist(),
+                "beyond": (np.abs(apart) > known).tolist(),
+            }
+            for a, b in combinations(answers, 2)
+            for apart, known in [_difference(a, b)]
         ],
         "versions": versions(),
     }
