@@ -13,7 +13,7 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -22,6 +22,7 @@ from bench import table, verdict
 
 from walking_irl.arrays import Array
 from walking_irl.domains.humanoid.body.physics import inverse_dynamics
+from walking_irl.domains.humanoid.body.variants import Surroundings, variant
 from walking_irl.domains.humanoid.gait.gait import Gait, cycle_motion
 from walking_irl.domains.humanoid.gait.realism import ON_GROUND
 from walking_irl.domains.humanoid.learner import search
@@ -47,12 +48,15 @@ class Recording(NamedTuple):
     """Of each cycle's joint angles [deg]."""
     cycles: int = 1
     force: bool = False
+    load: float = 0.0
+    """On the back [kg]: of a body that the search does not know of."""
 
     @property
     def quality(self) -> str:
         """How well it is recorded, in words."""
         cycles = "1 cycle" if self.cycles == 1 else f"{self.cycles} cycles"
-        return f"{self.noise:g} deg, {cycles}{', force' if self.force else ''}"
+        load = f", {self.load:g} kg on the back that nobody told of" if self.load else ""
+        return f"{self.noise:g} deg, {cycles}{', force' if self.force else ''}{load}"
 
 
 @dataclass(frozen=True)
@@ -86,6 +90,9 @@ def main() -> None:
     parser.add_argument("--noise", type=float, nargs="+", default=[1.0, 2.0], help="[deg]")
     parser.add_argument("--cycles", type=int, nargs="+", default=[1], help="of each recording")
     parser.add_argument("--force", action="store_true", help="with the vertical force")
+    parser.add_argument(
+        "--load", type=float, default=0.0, help="unknown to the search [kg]"
+    )
     parser.add_argument("--planar", action="store_true", help="a smaller body, in a plane")
     parser.add_argument("--quick", action="store_true", help="one walker in the plane")
     parser.add_argument("--results", type=Path, help="one line a walker; known ones are not redone")
@@ -93,7 +100,7 @@ def main() -> None:
     args = parser.parse_args()
     spec = PLANAR if args.planar or args.quick else HUMANOID
     asked = [
-        Recording(population, seed, noise, cycles, args.force)
+        Recording(population, seed, noise, cycles, args.force, args.load)
         for seed in range(args.walkers)
         for cycles in args.cycles
         for noise in args.noise
@@ -121,7 +128,7 @@ def read(path: Path | None) -> dict[Recording, Result]:
     out = {}
     for line in path.read_text().splitlines():
         row = json.loads(line)
-        key = Recording(**{name: row.pop(name) for name in Recording._fields})
+        key = Recording(**{name: row.pop(name) for name in Recording._fields if name in row})
         out[key] = Result(**row)
     return out
 
@@ -131,7 +138,8 @@ def recovered(spec: WalkerSpec, recording: Recording) -> Result:
     rng = np.random.default_rng(recording.seed)
     reference = spec.stack.reference_weights
     w = POPULATIONS[recording.population](rng, reference)
-    walk = recorded(spec, search(spec, w).policy, recording, rng)
+    there = replace(spec, body=variant(spec.body, Surroundings(load=recording.load)))
+    walk = recorded(there, search(there, w).policy, recording, rng)
     near = nearest(spec, walk)
     fit = joint_fit(spec, walk, reference, near, near.total_costs)
     end = fit.last
@@ -201,9 +209,9 @@ def markdown(results: dict[Recording, Result]) -> str:
         "weights held",
     )
     lines = [f"| {' | '.join(heads)} |", "|" + " --- |" * len(heads)]
-    by_quality: dict[tuple[bool, int, float], dict[Recording, Result]] = {}
+    by_quality: dict[tuple[float, bool, int, float], dict[Recording, Result]] = {}
     for r, found in results.items():
-        by_quality.setdefault((r.force, r.cycles, r.noise), {})[r] = found
+        by_quality.setdefault((r.load, r.force, r.cycles, r.noise), {})[r] = found
     lines += [f"| {' | '.join(_row(by_quality[key]))} |" for key in sorted(by_quality)]
     return "\n".join(lines) + "\n"
 
