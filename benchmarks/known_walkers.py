@@ -90,9 +90,7 @@ def main() -> None:
     parser.add_argument("--noise", type=float, nargs="+", default=[1.0, 2.0], help="[deg]")
     parser.add_argument("--cycles", type=int, nargs="+", default=[1], help="of each recording")
     parser.add_argument("--force", action="store_true", help="with the vertical force")
-    parser.add_argument(
-        "--load", type=float, default=0.0, help="unknown to the search [kg]"
-    )
+    parser.add_argument("--load", type=float, default=0.0, help="unknown to the search [kg]")
     parser.add_argument("--planar", action="store_true", help="a smaller body, in a plane")
     parser.add_argument("--quick", action="store_true", help="one walker in the plane")
     parser.add_argument("--results", type=Path, help="one line a walker; known ones are not redone")

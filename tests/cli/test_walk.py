@@ -16,6 +16,7 @@ from walking_irl.domains.humanoid.costs.defaults import REFERENCE_WEIGHTS
 from walking_irl.domains.humanoid.gait.library import load_gaits
 from walking_irl.domains.humanoid.recorded.feasible import Feasible
 from walking_irl.domains.humanoid.spec import HUMANOID
+from walking_irl.errors import InvalidInputError
 from walking_irl.recording.reader import Recording, inspect_recording
 from walking_irl.run import walk as module
 
@@ -48,9 +49,28 @@ def test_options_without_effect_are_named(walked, capsys, options, word):
     assert not out and word in err and err.count("\n") == 1
 
 
-def test_a_habit_is_accepted_of_a_person_only(walked, capsys):
-    assert main(["recover", "--accept-habit"]) == 2
-    assert "--walk" in capsys.readouterr().err
+@pytest.mark.parametrize("options", [("--accept-habit",), ("--height", "1.8"), ("--from", "0")])
+def test_what_is_said_of_a_recording_needs_one(walked, capsys, options):
+    assert main(["recover", *options]) == 2
+    err = capsys.readouterr().err
+    assert options[0] in err and "--walk" in err
+
+
+def test_a_recording_is_read_as_the_user_knows_it(walked, capsys, monkeypatch):
+    """A part of it, and a height: the same as ``read`` takes."""
+    seen = []
+
+    def stop(person, *others):
+        seen.append(person)
+        raise InvalidInputError("far enough")
+
+    monkeypatch.setattr(command, "_explain", stop)
+    assert main(["recover", "--walk", walked]) == 2
+    assert main(["recover", "--walk", walked, "--to", "1.5", "--height", "2.0"]) == 2
+    whole, part = seen
+    assert part.seconds < 1.6 < whole.seconds and part.scale < 0.95 * whole.scale
+    assert main(["recover", "--walk", walked, "--belt", "nan"]) == 2
+    assert "belt must be a number" in capsys.readouterr().err
 
 
 def test_what_is_no_recording_is_refused_before_anything_is_solved(walked, capsys, tmp_path):

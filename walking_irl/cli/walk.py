@@ -14,6 +14,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from walking_irl.cli import DONE
+from walking_irl.cli.read import FLAGS, add_options, options_of, to_json
 from walking_irl.errors import InvalidInputError
 from walking_irl.files import check_ending, check_outputs, write_json
 from walking_irl.workers import workers
@@ -64,6 +65,8 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
         help="give weights even where the body cannot follow the walk",
     )
 
+    add_options(group)
+
 
 def refuse_alone(args: argparse.Namespace) -> None:
     """Complain about arguments that need ``--walk``.
@@ -71,8 +74,9 @@ def refuse_alone(args: argparse.Namespace) -> None:
     Raises:
         InvalidInputError: If one is given without it.
     """
-    if args.accept_habit:
-        raise InvalidInputError("--accept-habit goes with --walk")
+    for name, flag in {"accept_habit": "--accept-habit", **FLAGS}.items():
+        if getattr(args, name) is not None and getattr(args, name) is not False:
+            raise InvalidInputError(f"{flag} goes with --walk")
 
 
 def run(args: argparse.Namespace, given: dict[str, Any], console: Console) -> int:
@@ -82,7 +86,8 @@ def run(args: argparse.Namespace, given: dict[str, Any], console: Console) -> in
     _refuse_others(args, given)
     check_ending(args.record, ".rrd")
     check_outputs([args.json, args.record], inputs=[p for paths in args.walk for p in paths])
-    people = [_read(paths, HUMANOID.walker) for paths in args.walk]
+    options = options_of(args)
+    people = [_read(paths, HUMANOID.walker, options) for paths in args.walk]
     answers = []
     with workers() as executor:
         for person, trials in people:
@@ -110,12 +115,12 @@ def _refuse_others(args: argparse.Namespace, given: dict[str, Any]) -> None:
         )
 
 
-def _read(paths: Sequence[Path], walker: Any) -> tuple[Person, list[Person]]:
+def _read(paths: Sequence[Path], walker: Any, options: Any) -> tuple[Person, list[Person]]:
     """A person, and each trial where there are several."""
     from walking_irl.domains.humanoid.recorded.person import averaged
     from walking_irl.domains.humanoid.recorded.reader import read_trials
 
-    trials = read_trials(paths, walker)
+    trials = read_trials(paths, walker, options)
     return (averaged(trials), trials) if len(trials) > 1 else (trials[0], [])
 
 
@@ -250,7 +255,6 @@ def _compare(a: Answer, b: Answer, spec: Any, console: Console) -> None:
 
 
 def _to_json(answers: Sequence[Answer], spec: Any) -> dict[str, Any]:
-    from walking_irl.cli.read import to_json
     from walking_irl.run.walk_report import explanation_json
     from walking_irl.versions import versions
 
