@@ -49,7 +49,8 @@ from walking_irl.types import Response
 
 OBSERVATIONS = 13.0
 """n: independent errors that a recorded cycle is worth. From walkers of known weights
-(``benchmarks/known_walkers.py``)."""
+(``benchmarks/known_walkers.py``): noise of joint angles alone would allow more, but with a load
+that the search does not know of errors nearly fill the half widths, and no person has our body."""
 SPREAD = 1.0
 """sigma: standard deviation of the log-weights of walkers about the reference; twice that of a
 typical one, and about that of weights drawn anywhere on the simplex."""
