@@ -110,14 +110,21 @@ def run_cpirl(
     given: Given, rng: Rng, *, mode: str = "minimise", centre: str = "ac", max_solves: int = 40
 ) -> Recovered:
     """CPIRL from features with their error bars."""
-    *_, last = cpirl(
-        given.forward,
-        given.expert,
-        centre=centre,
-        mode=mode,  # type: ignore[arg-type]  # checked by cpirl
-        max_solves=max_solves,
-        rng=rng,
+    run = list(
+        cpirl(
+            given.forward,
+            given.expert,
+            centre=centre,
+            mode=mode,  # type: ignore[arg-type]  # checked by cpirl
+            max_solves=max_solves,
+            rng=rng,
+        )
     )
+    last = run[-1]
+    log: dict[str, Any] = {
+        "objective": np.array([it.best_regret for it in run]),
+        "iterates": np.array([it.estimate for it in run]),
+    }
     info = {
         "solves": last.k + 1,
         "intervals": last.intervals,
@@ -125,7 +132,9 @@ def run_cpirl(
         "regret": last.best_regret,
     }
     if given.is_finite:
-        return from_weights(given.mdp, last.estimate, "simplex", status=last.status, info=info)
+        return from_weights(
+            given.mdp, last.estimate, "simplex", status=last.status, info=info, **log
+        )
     answer = given.forward(last.estimate)
     return Recovered(
         w=last.estimate,
@@ -134,6 +143,7 @@ def run_cpirl(
         mu=answer.mu,
         status=last.status,
         info=info,
+        **log,
     )
 
 
@@ -178,7 +188,7 @@ def _apprenticeship(
 ) -> Recovered:
     """A mixture of policies: signed weights in finite worlds, the simplex elsewhere."""
     is_signed = given.is_finite and method is not BASELINES["kelley"]
-    *_, last = method(
+    run = method(
         given.forward,
         given.exact,
         rng=rng,
@@ -186,7 +196,7 @@ def _apprenticeship(
         tol=tol,
         max_solves=max_solves,
     )
-    return _mixed(given, last, is_signed)
+    return _mixed(given, list(run), is_signed)
 
 
 def _game(name: str, given: Given, rng: Rng, **options: Any) -> Recovered:
@@ -197,32 +207,40 @@ def _game(name: str, given: Given, rng: Rng, **options: Any) -> Recovered:
         corners = np.eye(len(given.exact.mu))
         span = max(float(np.abs(given.forward(w).mu - given.exact.mu).max()) for w in corners)
         setting = Setting(False, span)
-        *_, last = BASELINES[name](given.forward, given.exact, rng=rng, setting=setting, **options)
-        return _mixed(given, last, False)
+        run = BASELINES[name](given.forward, given.exact, rng=rng, setting=setting, **options)
+        return _mixed(given, list(run), False)
     mdp = signed(given.planned)
     expert = Expert(np.r_[given.exact.mu, -given.exact.mu], np.zeros(2 * len(given.exact.mu)))
     span = 2 * float(np.abs(mdp.Phi).max()) / (1 - mdp.discount)
-    *_, last = BASELINES[name](
+    run = BASELINES[name](
         solver(mdp), expert, rng=rng, setting=Setting(False, span, mdp), **options
     )
-    return _mixed(given, last, True)
+    return _mixed(given, list(run), True)
 
 
-def _mixed(given: Given, last: Apprentice, is_signed: bool) -> Recovered:
-    """The mixture as one stationary policy where there are states, else as it is."""
+def _mixed(given: Given, run: list[Apprentice], is_signed: bool) -> Recovered:
+    """The mixture as one stationary policy where there are states, else as it is.
+
+    The log is the distance of the mixture's features to the expert's after each solve.
+    """
+    last, K = run[-1], len(given.exact.mu)
     info = {"solves": len(last.W), "mixture": last.mixture}
+    log: dict[str, Any] = {
+        "objective": np.array([np.linalg.norm((a.mu - a.mu_E)[:K]) for a in run]),
+        "iterates": last.W if last.W.shape[1] == K else last.W[:, :K] - last.W[:, K:],
+    }
     if given.is_finite:
         policy, _ = given.planned.stationary_policy(
             [r.policy for r in last.responses], last.mixture
         )
         mu = given.mdp.feature_expectations(policy)
-        return Recovered(policy=policy, mu=mu, status=last.status, info=info)
-    K = len(last.mu_E)
+        return Recovered(policy=policy, mu=mu, status=last.status, info=info, **log)
     return Recovered(
-        w=last.W[-1][:K],
+        w=last.W[-1],
         space="box" if is_signed else "simplex",
         policy=tuple(r.policy for r in last.responses),
         mu=last.mu,
         status=last.status,
         info=info,
+        **log,
     )

@@ -105,11 +105,13 @@ def maxent(
     start, H = demonstrations.start(mdp.n_states), demonstrations.horizon
     F_E = demonstrations.features(mdp.Phi, discount).mean(axis=0)
     log: list[float] = []
+    tried: list[Array] = []
 
     def likelihood(w: Array) -> tuple[float, Array]:
         passed = backward(mdp, mdp.Phi @ w, H, discount)
         gradient = F_E - mdp.Phi.T @ expected_visits(mdp, passed, start, visits, discount)
         log.append(float(w @ F_E - start @ passed.log_Z[0]))
+        tried.append(w.copy())
         return log[-1] - 0.5 * ridge * float(w @ w), gradient - ridge * w
 
     if visits == "paths":
@@ -131,6 +133,7 @@ def maxent(
         w,
         "free",
         objective=np.array(log),
+        iterates=np.array(tried),
         status=status,
         info={"solves": len(log), "residual": residual},
         notes=(STOCHASTIC,) if is_stochastic(mdp) else (),

@@ -56,6 +56,8 @@ class Minimum(NamedTuple):
     c: float
     log: Array
     """Best c after each solve, shape (n,)."""
+    iterates: Array
+    """Weights of that c, shape (n, K)."""
     lower: float
     """Lower bound of c where cuts give one, else minus infinity."""
     cuts: tuple[Cut, ...]
@@ -138,7 +140,14 @@ def mmp(
         notes.append("no policy has the demonstrations' features: too few trajectories")
     info = {"solves": len(found.log), "c": found.c, "lower": found.lower}
     return from_weights(
-        mdp, found.w, "free", objective=found.log, status=status, info=info, notes=tuple(notes)
+        mdp,
+        found.w,
+        "free",
+        objective=found.log,
+        iterates=found.iterates,
+        status=status,
+        info=info,
+        notes=tuple(notes),
     )
 
 
@@ -170,6 +179,7 @@ def by_cuts(
     D = [mdp.Phi.T @ cut.visits - mu_E for cut in known]
     w, pi = np.zeros(len(mu_E)), None
     best, lower, log = (np.inf, w), -np.inf, []
+    at: list[Array] = []
     if known:
         w, lower = quadratic_program(np.array(D), _offsets(known), ridge, is_nonnegative)
     for _ in range(max_solves):
@@ -179,10 +189,11 @@ def by_cuts(
         known.append(Cut(found.visits, found.margin))
         D.append(mdp.Phi.T @ found.visits - mu_E)
         log.append(best[0])
+        at.append(best[1])
         if best[0] - lower <= tol * max(1.0, abs(best[0])):
             break
         w, lower = quadratic_program(np.array(D), _offsets(known), ridge, is_nonnegative)
-    return Minimum(best[1], best[0], np.array(log), lower, tuple(known))
+    return Minimum(best[1], best[0], np.array(log), np.array(at), lower, tuple(known))
 
 
 def _offsets(cuts: Sequence[Cut]) -> Array:
@@ -228,17 +239,19 @@ def by_subgradients(
     positive(ridge=ridge, n_steps=n_steps)
     w = average = np.zeros(len(mu_E))
     best, pi = (np.inf, w), None
-    log, cuts = [], []
+    log, at, cuts = [], [], []
     for t in range(n_steps):
         found = augmented(mdp, w, mu_E, loss, ridge, pi)
         pi = found.pi
         cuts.append(Cut(found.visits, found.margin))
         best = min(best, (found.c, w), key=lambda pair: pair[0])
         log.append(best[0])
+        at.append(best[1])
         subgradient = mdp.Phi.T @ found.visits - mu_E + ridge * w
         w = w - subgradient / (ridge * (t + 1))
         w = np.maximum(w, 0.0) if is_nonnegative else w
         average = average + 2 * (t + 1) / (n_steps * (n_steps + 1)) * w
     at_average = augmented(mdp, average, mu_E, loss, ridge, pi).c
     best = min(best, (at_average, average), key=lambda pair: pair[0])
-    return Minimum(best[1], best[0], np.array([*log, best[0]]), -np.inf, tuple(cuts))
+    log, at = [*log, best[0]], [*at, best[1]]
+    return Minimum(best[1], best[0], np.array(log), np.array(at), -np.inf, tuple(cuts))

@@ -25,6 +25,8 @@ from walking_irl.types import Status
 
 KEPT_POINTS, KEPT_POLICIES = 50_000, 500
 """Grid points whose posterior is remembered, and policies whose successor features are."""
+FEW = 100.0
+"""Independent samples below which a chain's intervals are rough."""
 TIE = 1e-9
 """Relative gain of an action over the policy's below which the policy still counts as greedy."""
 
@@ -143,8 +145,35 @@ def policywalk(
         space,
         samples=samples,
         objective=log[burn_in:],
-        status=Status.BUDGET,
+        iterates=samples,
+        status=Status.SAMPLED,
         info=info,
+        notes=_notes(samples, delta * top if is_box else None),
+    )
+
+
+def _notes(samples: Array, bound: float | None) -> tuple[str, ...]:
+    """What a reader of the posterior should know of its chain."""
+    notes = list(mixing(samples))
+    if bound is not None:
+        share = float((np.abs(samples).max(axis=1) > bound - 1e-9).mean())
+        if share > 0.5:
+            notes.append(
+                f"a weight lies at the bound of the box in {100 * share:.0f} % of the samples: the "
+                "expert acts with more certainty than the box allows, and the intervals are too "
+                "narrow; the ratios of weights still say what it prefers"
+            )
+    return tuple(notes)
+
+
+def mixing(samples: Array) -> tuple[str, ...]:
+    """A warning where a chain is worth few independent samples."""
+    least = float(effective_sample_sizes(samples).min())
+    if least >= FEW:
+        return ()
+    return (
+        f"the chain is worth {least:.0f} independent samples of its weakest weight: draw more "
+        "before you trust its intervals",
     )
 
 

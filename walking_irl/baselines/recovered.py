@@ -33,6 +33,8 @@ class Recovered:
         mu: Feature expectations of that policy, shape (K,).
         samples: Weights drawn from a posterior, shape (m, K).
         objective: The method's objective after each iteration, shape (n,).
+        iterates: The weights that each of these entries is of, shape (n, K), where it is of some;
+            they may be in another scale than ``w``.
         status: Why it ended.
         info: Figures of the method (forward solves, effective sample size, intervals, ...).
         notes: Sentences that a reader of the answer should know.
@@ -45,6 +47,7 @@ class Recovered:
     mu: Array | None = None
     samples: Array | None = None
     objective: Array = field(default_factory=lambda: np.empty(0))
+    iterates: Array | None = None
     status: Status = Status.CONVERGED
     info: Mapping[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
@@ -54,6 +57,11 @@ class Recovered:
             raise InvalidInputError(
                 f"weights come with their space, one of {', '.join(get_args(Space))}; got "
                 f"{'no ' if self.w is None else ''}weights and {self.space!r}"
+            )
+        if self.iterates is not None and len(self.iterates) != len(self.objective):
+            raise InvalidInputError(
+                f"each entry of the log needs its weights, got {len(self.iterates)} for "
+                f"{len(self.objective)}"
             )
 
 
