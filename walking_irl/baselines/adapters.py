@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from walking_irl.arrays import Array
 from walking_irl.baselines import BASELINES
 from walking_irl.baselines.apprentice import Apprentice
 from walking_irl.baselines.archive import archive_maxent, archive_posterior
@@ -76,7 +77,7 @@ def run_mce_likelihood(given: Given, rng: Rng, **options: Any) -> Recovered:
 def run_mce_matching(given: Given, rng: Rng, **options: Any) -> Recovered:
     """MCE by features; over an archive of policies outside of finite worlds."""
     if not given.is_finite:
-        return archive_maxent(_archive(given, rng, options), given.exact.mu, **options)
+        return _over_archive(archive_maxent, given, rng, options)
     found = mce_matching(given.planned, given.exact, **options)
     return replace(found, mu=given.mdp.feature_expectations(found.policy))
 
@@ -89,15 +90,14 @@ def run_maxent(given: Given, rng: Rng, **options: Any) -> Recovered:
 def run_relative_entropy(given: Given, rng: Rng, **options: Any) -> Recovered:
     """Relative entropy; the archive stands for samples outside of finite worlds."""
     if not given.is_finite:
-        return archive_maxent(_archive(given, rng, options), given.exact.mu, **options)
+        return _over_archive(archive_maxent, given, rng, options)
     return relative_entropy(given.mdp, given.demonstrations, rng=rng, **options)
 
 
 def run_policywalk(given: Given, rng: Rng, **options: Any) -> Recovered:
     """PolicyWalk; over an archive of policies outside of finite worlds."""
     if not given.is_finite:
-        M = _archive(given, rng, options)
-        return archive_posterior(M, given.exact.mu, rng=rng, **options)
+        return _over_archive(partial(archive_posterior, rng=rng), given, rng, options)
     return policywalk(given.mdp, given.demonstrations, rng=rng, **options)
 
 
@@ -177,10 +177,17 @@ def run_lpal(given: Given, rng: Rng, **options: Any) -> Recovered:
     return _game("lpal", given, rng, **options)
 
 
-def _archive(given: Given, rng: Rng, options: dict[str, Any]) -> Array:
-    """Policies to compare the expert with: the option ``archive`` (n, K), or a run of CPIRL's."""
+def _over_archive(
+    method: Callable[..., Recovered], given: Given, rng: Rng, options: dict[str, Any]
+) -> Recovered:
+    """Compare the expert with policies: the option ``archive`` (n, K), or those of a CPIRL run."""
     known = options.pop("archive", None)
-    return given.archive(rng) if known is None else np.asarray(known, dtype=np.float64)
+    if known is not None:
+        return method(known, given.exact.mu, **options)
+    M, n_solves = given.archive(rng)
+    found = method(M, given.exact.mu, **options)
+    note = f"it compares the expert with {len(M)} policies that CPIRL evaluated by cuts alone"
+    return replace(found, info={**found.info, "solves": n_solves}, notes=(note, *found.notes))
 
 
 def _apprenticeship(

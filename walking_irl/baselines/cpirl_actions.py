@@ -95,10 +95,10 @@ class Estimate(NamedTuple):
 def estimate(mdp: FiniteMDP, w: Array, counts: Array) -> Estimate:
     """g(w) with the completion and the optimal policy that it compares."""
     completed = complete(mdp, w, counts)
-    pi = best_policy(mdp, mdp.reward(w)).pi
-    mu = mdp.Phi.T @ Chain(mdp, pi).solve_transposed(mdp.start)
+    best = best_policy(mdp, mdp.reward(w))
+    mu = mdp.Phi.T @ best.chain.solve_transposed(mdp.start)
     g = max(0.0, float(w @ (mu - completed.mu)))
-    return Estimate(w, g, completed, Response(pi, mu))
+    return Estimate(w, g, completed, Response(best.pi, mu))
 
 
 def cpirl_actions(
@@ -210,8 +210,8 @@ def _round(
 
     def forward(w: Array) -> Response:
         nonlocal is_first, pi
-        pi = best_policy(mdp, mdp.reward(w), pi=pi).pi
-        mu = mdp.Phi.T @ Chain(mdp, pi).solve_transposed(mdp.start)
+        best = best_policy(mdp, mdp.reward(w), pi=pi)
+        pi, mu = best.pi, mdp.Phi.T @ best.chain.solve_transposed(mdp.start)
         evaluated = np.array(known) if is_first else np.empty((0, len(mu)))
         is_first = False
         return Response(pi, mu, evaluated=evaluated)

@@ -8,15 +8,16 @@ for any features.
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Sequence
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
+from scipy import sparse
 
 from walking_irl.arrays import Array
 from walking_irl.baselines.recovered import Recovered, from_start, from_weights, positive
 from walking_irl.errors import InvalidInputError, SolverError
-from walking_irl.rl.chain import Chain
 from walking_irl.rl.demonstrations import Demonstrations
 from walking_irl.rl.finite_mdp import Actions, FiniteMDP
 from walking_irl.rl.tabular import best_policy
@@ -84,7 +85,7 @@ def augmented(
         pi: Policy to start from, shape (S,).
     """
     best = best_policy(mdp, mdp.reward(w)[:, None] + loss, pi=pi)
-    x = Chain(mdp, best.pi).solve_transposed(mdp.start)
+    x = best.chain.solve_transposed(mdp.start)
     c = float(mdp.start @ best.V - w @ mu_E + 0.5 * ridge * w @ w)
     return Augmented(c, x, float(x @ loss[np.arange(x.size), best.pi]), best.pi)
 
@@ -205,22 +206,32 @@ def quadratic_program(
 ) -> tuple[Array, float]:
     """Minimise ridge/2 |w|^2 + max_i (D_i.w + l_i): weights (K,) and the value.
 
+    Clarabel gets the program as it is: hundreds are solved, and to compile one takes longer.
+
     Raises:
         SolverError: If Clarabel fails.
     """
-    import cvxpy
-
-    w, z = cvxpy.Variable(D.shape[1]), cvxpy.Variable()
-    rules = [D @ w + loss <= z] + ([w >= 0] if is_nonnegative else [])
-    problem = cvxpy.Problem(cvxpy.Minimize(ridge / 2 * cvxpy.sum_squares(w) + z), rules)
-    try:
-        problem.solve(solver=cvxpy.CLARABEL)
-    except cvxpy.SolverError as error:
-        raise SolverError(f"the quadratic program of MMP has no solution: {error}") from error
-    if w.value is None:
-        raise SolverError(f"the quadratic program of MMP is {problem.status}")
-    value = np.maximum(w.value, 0.0) if is_nonnegative else w.value
-    return np.asarray(value), float(problem.value)
+    clarabel: Any = importlib.import_module("clarabel")
+    n, K = D.shape
+    rows, right = [np.c_[D, -np.ones(n)]], [-loss]  # of (w, z)
+    if is_nonnegative:
+        rows.append(np.c_[-np.eye(K), np.zeros(K)])
+        right.append(np.zeros(K))
+    b = np.concatenate(right)
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    found = clarabel.DefaultSolver(
+        sparse.csc_array(np.diag(np.r_[np.full(K, ridge), 0.0])),
+        np.r_[np.zeros(K), 1.0],
+        sparse.csc_array(np.concatenate(rows)),
+        b,
+        [clarabel.NonnegativeConeT(len(b))],
+        settings,
+    ).solve()
+    if str(found.status) not in ("Solved", "AlmostSolved"):
+        raise SolverError(f"the quadratic program of MMP has no solution: {found.status}")
+    w = np.array(found.x[:K])
+    return np.maximum(w, 0.0) if is_nonnegative else w, float(found.obj_val)
 
 
 def by_subgradients(

@@ -48,8 +48,9 @@ def boltzmann_policy(
 
     d pi = beta pi (dQ - sum_b pi dQ). Q* has kinks where actions tie: one of its slopes is taken.
     """
-    greedy = best_policy(mdp, mdp.reward(w), pi=pi).pi
-    dQ = successor(mdp, greedy)
+    best = best_policy(mdp, mdp.reward(w), pi=pi)
+    greedy = best.pi
+    dQ = successor(mdp, greedy, chain=best.chain)
     q = beta * (dQ @ w)
     P = np.exp(q - q.max(axis=1, keepdims=True))
     P /= P.sum(axis=1, keepdims=True)

@@ -16,11 +16,11 @@ from scipy.special import logsumexp
 
 from walking_irl.arrays import Array, Indices
 from walking_irl.baselines.recovered import Recovered, from_weights, positive
-from walking_irl.errors import InvalidInputError
+from walking_irl.errors import InvalidInputError, SolverError
 from walking_irl.rl.demonstrations import Demonstrations
 from walking_irl.rl.finite_mdp import Actions, FiniteMDP
 from walking_irl.rl.successor import successor
-from walking_irl.rl.tabular import best_policy
+from walking_irl.rl.tabular import MAX_IMPROVEMENTS, best_policy
 from walking_irl.types import Status
 
 KEPT_POINTS, KEPT_POLICIES = 50_000, 500
@@ -59,22 +59,31 @@ class Posterior:
 
     def at(self, w: Array, near: Place | None = None) -> Place:
         """The posterior of weights w, shape (K,), starting from the policy of a near place."""
-        start = None
-        if near is not None:
-            Q = near.Psi @ w
-            own = np.take_along_axis(Q, near.pi[:, None], axis=1)[:, 0]
-            if (Q.max(axis=1) <= own + TIE * max(1.0, float(np.abs(Q).max()))).all():
-                return near._replace(log_posterior=self._log_likelihood(Q))
-            start = near.pi
-        self.n_solves += 1
-        pi = best_policy(self.mdp, self.mdp.Phi @ w, pi=start).pi
+        if near is None:
+            pi = best_policy(self.mdp, self.mdp.Phi @ w).pi
+            Psi, self.n_solves = self._successor(pi), self.n_solves + 1
+            return Place(pi, Psi, self._log_likelihood(Psi @ w))
+        pi, Psi, n_improved = near.pi, near.Psi, 0
+        while True:  # policy iteration: successor features evaluate a policy for any weights
+            Q = Psi @ w
+            own = np.take_along_axis(Q, pi[:, None], axis=1)[:, 0]
+            is_better = Q.max(axis=1) > own + TIE * max(1.0, float(np.abs(own).max()))
+            if not is_better.any():
+                self.n_solves += n_improved > 0
+                return Place(pi, Psi, self._log_likelihood(Q))
+            if n_improved == MAX_IMPROVEMENTS:
+                raise SolverError(f"the policy still changes after {n_improved} improvements")
+            pi = np.where(is_better, Q.argmax(axis=1), pi)
+            Psi, n_improved = self._successor(pi), n_improved + 1
+
+    def _successor(self, pi: Actions) -> Array:
+        """Successor features of a policy, remembered."""
         key = pi.tobytes()
         if key not in self._successors:
             if len(self._successors) >= KEPT_POLICIES:
                 self._successors.clear()
             self._successors[key] = successor(self.mdp, pi)
-        Psi = self._successors[key]
-        return Place(pi, Psi, self._log_likelihood(Psi @ w))
+        return self._successors[key]
 
     def _log_likelihood(self, Q: Array) -> float:
         """Sum of c(s, a) [alpha Q(s, a) - log sum_b exp alpha Q(s, b)]."""

@@ -10,7 +10,6 @@ import numpy as np
 
 from walking_irl.arrays import Array
 from walking_irl.errors import InvalidInputError
-from walking_irl.rl.chain import Chain
 from walking_irl.rl.demonstrations import Demonstrations
 from walking_irl.rl.finite_mdp import FiniteMDP
 from walking_irl.rl.tabular import best_policy
@@ -67,9 +66,9 @@ class Recovered:
 
 def from_reward(mdp: FiniteMDP, reward: Array, **fields: Any) -> Recovered:
     """A recovered tabular reward with its optimal policy and that policy's features."""
-    pi = best_policy(mdp, reward).pi
-    mu = mdp.Phi.T @ Chain(mdp, pi).solve_transposed(mdp.start)
-    return Recovered(reward=reward, policy=pi, mu=mu, **fields)
+    best = best_policy(mdp, reward)
+    mu = mdp.Phi.T @ best.chain.solve_transposed(mdp.start)
+    return Recovered(reward=reward, policy=best.pi, mu=mu, **fields)
 
 
 def from_weights(mdp: FiniteMDP, w: Array, space: Space, **fields: Any) -> Recovered:

@@ -29,7 +29,7 @@ class Found:
         status: The same as one word.
         w: Weights, shape (K,), or None where it answers with a policy or a reward of states.
         is_signed: Whether weights may be negative.
-        intervals: 95 % intervals of the weights, shape (K, 2), or None.
+        intervals: Intervals of the weights, shape (K, 2), or None.
         samples: Weights drawn from a posterior, shape (m, K), or None.
         objective: The method's objective after each iteration, shape (n,).
         iterates: Weights that each of these is of, shape (n, K), or None.
@@ -103,7 +103,7 @@ def _table(experiment: Experiment, found: Found) -> str:
     columns = [("ground truth", experiment.w_expert), ("recovered", found.w)]
     shown = [(name, values) for name, values in columns if values is not None]
     head = ["objective", *(name for name, _ in shown)]
-    head += ["95 % interval"] if found.intervals is not None else []
+    head += ["interval"] if found.intervals is not None else []
     rows = [head, ["---"] * len(head)]
     for j, objective in enumerate(experiment.objectives):
         cells = [objective.name, *(f"{values[j]:.4f}" for _, values in shown)]
