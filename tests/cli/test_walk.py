@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from person_files import recording, storage
+from person_files import force_plates, recording, storage
 from rich.console import Console
 
 from walking_irl.cli import walk as command
@@ -95,17 +95,9 @@ def test_no_weights_are_told_of_what_is_no_habit_of_this_body(walked, monkeypatc
 def test_a_person_s_answer_comes_in_its_order(walked, monkeypatch, capsys, tmp_path):
     """One start; the model's own walk is nearly optimal for its own weights."""
     monkeypatch.setattr(module, "starting_weights", lambda reference: reference[None])
-    argv = [
-        "recover",
-        "--walk",
-        walked,
-        "--walk",
-        walked,
-        "--json",
-        "out.json",
-        "--record",
-        "w.rrd",
-    ]
+    (tmp_path / "w_grf.mot").write_text(storage(force_plates(GAIT, WALKER), degrees=None))
+    who = ("--walk", walked, "w_grf.mot")
+    argv = ["recover", *who, *who, "--json", "out.json", "--record", "w.rrd"]
     again = command._explain
     known = []
 
@@ -117,7 +109,8 @@ def test_a_person_s_answer_comes_in_its_order(walked, monkeypatch, capsys, tmp_p
     assert main(argv) == 0
     out = capsys.readouterr().out
     places = [out.index(f"\n{k}. ") for k in range(1, 6)]
-    assert places == sorted(places) and "w.mot against w.mot" in out
+    assert places == sorted(places) and "w.mot, w_grf.mot against w.mot" in out
+    assert "vertical force 0.0" in out  # the model's own, within .1 body weights
     recording = Recording(tmp_path / "w.rrd")
     for who in ("/world/walker", "/world/expert", "/world/nearest", "/polyhedron", "/norms/knee"):
         assert any(e.startswith(who) for e in recording.entities), who
@@ -126,7 +119,7 @@ def test_a_person_s_answer_comes_in_its_order(walked, monkeypatch, capsys, tmp_p
     known = inspect_recording(tmp_path / "w.rrd")
     content = json.loads((tmp_path / "out.json").read_text())
     (comparison,) = content["comparisons"]
-    assert comparison["people"] == ["w.mot", "w.mot"] and not any(comparison["beyond"])
+    assert comparison["people"] == 2 * ["w.mot, w_grf.mot"] and not any(comparison["beyond"])
     assert "differ in no weight beyond" in out
     person = content["people"][0]
     low, high = person["suboptimality"]
