@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from walking_irl.arrays import Array
 from walking_irl.baselines import BASELINES
 from walking_irl.baselines.apprentice import Apprentice
 from walking_irl.baselines.archive import archive_maxent, archive_posterior
@@ -76,7 +77,7 @@ def run_mce_likelihood(given: Given, rng: Rng, **options: Any) -> Recovered:
 def run_mce_matching(given: Given, rng: Rng, **options: Any) -> Recovered:
     """MCE by features; over an archive of policies outside of finite worlds."""
     if not given.is_finite:
-        return archive_maxent(_archive(given, rng, options), given.exact.mu, **options)
+        return _over_archive(archive_maxent, given, rng, options)
     found = mce_matching(given.planned, given.exact, **options)
     return replace(found, mu=given.mdp.feature_expectations(found.policy))
 
@@ -89,15 +90,14 @@ def run_maxent(given: Given, rng: Rng, **options: Any) -> Recovered:
 def run_relative_entropy(given: Given, rng: Rng, **options: Any) -> Recovered:
     """Relative entropy; the archive stands for samples outside of finite worlds."""
     if not given.is_finite:
-        return archive_maxent(_archive(given, rng, options), given.exact.mu, **options)
+        return _over_archive(archive_maxent, given, rng, options)
     return relative_entropy(given.mdp, given.demonstrations, rng=rng, **options)
 
 
 def run_policywalk(given: Given, rng: Rng, **options: Any) -> Recovered:
     """PolicyWalk; over an archive of policies outside of finite worlds."""
     if not given.is_finite:
-        M = _archive(given, rng, options)
-        return archive_posterior(M, given.exact.mu, rng=rng, **options)
+        return _over_archive(partial(archive_posterior, rng=rng), given, rng, options)
     return policywalk(given.mdp, given.demonstrations, rng=rng, **options)
 
 
@@ -110,14 +110,21 @@ def run_cpirl(
     given: Given, rng: Rng, *, mode: str = "minimise", centre: str = "ac", max_solves: int = 40
 ) -> Recovered:
     """CPIRL from features with their error bars."""
-    *_, last = cpirl(
-        given.forward,
-        given.expert,
-        centre=centre,
-        mode=mode,  # type: ignore[arg-type]  # checked by cpirl
-        max_solves=max_solves,
-        rng=rng,
+    run = list(
+        cpirl(
+            given.forward,
+            given.expert,
+            centre=centre,
+            mode=mode,  # type: ignore[arg-type]  # checked by cpirl
+            max_solves=max_solves,
+            rng=rng,
+        )
     )
+    last = run[-1]
+    log: dict[str, Any] = {
+        "objective": np.array([it.best_regret for it in run]),
+        "iterates": np.array([it.estimate for it in run]),
+    }
     info = {
         "solves": last.k + 1,
         "intervals": last.intervals,
@@ -125,7 +132,9 @@ def run_cpirl(
         "regret": last.best_regret,
     }
     if given.is_finite:
-        return from_weights(given.mdp, last.estimate, "simplex", status=last.status, info=info)
+        return from_weights(
+            given.mdp, last.estimate, "simplex", status=last.status, info=info, **log
+        )
     answer = given.forward(last.estimate)
     return Recovered(
         w=last.estimate,
@@ -134,6 +143,7 @@ def run_cpirl(
         mu=answer.mu,
         status=last.status,
         info=info,
+        **log,
     )
 
 
@@ -167,10 +177,17 @@ def run_lpal(given: Given, rng: Rng, **options: Any) -> Recovered:
     return _game("lpal", given, rng, **options)
 
 
-def _archive(given: Given, rng: Rng, options: dict[str, Any]) -> Array:
-    """Policies to compare the expert with: the option ``archive`` (n, K), or a run of CPIRL's."""
+def _over_archive(
+    method: Callable[..., Recovered], given: Given, rng: Rng, options: dict[str, Any]
+) -> Recovered:
+    """Compare the expert with policies: the option ``archive`` (n, K), or those of a CPIRL run."""
     known = options.pop("archive", None)
-    return given.archive(rng) if known is None else np.asarray(known, dtype=np.float64)
+    if known is not None:
+        return method(known, given.exact.mu, **options)
+    M, n_solves = given.archive(rng)
+    found = method(M, given.exact.mu, **options)
+    note = f"it compares the expert with {len(M)} policies that CPIRL evaluated by cuts alone"
+    return replace(found, info={**found.info, "solves": n_solves}, notes=(note, *found.notes))
 
 
 def _apprenticeship(
@@ -178,7 +195,7 @@ def _apprenticeship(
 ) -> Recovered:
     """A mixture of policies: signed weights in finite worlds, the simplex elsewhere."""
     is_signed = given.is_finite and method is not BASELINES["kelley"]
-    *_, last = method(
+    run = method(
         given.forward,
         given.exact,
         rng=rng,
@@ -186,7 +203,7 @@ def _apprenticeship(
         tol=tol,
         max_solves=max_solves,
     )
-    return _mixed(given, last, is_signed)
+    return _mixed(given, list(run), is_signed)
 
 
 def _game(name: str, given: Given, rng: Rng, **options: Any) -> Recovered:
@@ -197,32 +214,40 @@ def _game(name: str, given: Given, rng: Rng, **options: Any) -> Recovered:
         corners = np.eye(len(given.exact.mu))
         span = max(float(np.abs(given.forward(w).mu - given.exact.mu).max()) for w in corners)
         setting = Setting(False, span)
-        *_, last = BASELINES[name](given.forward, given.exact, rng=rng, setting=setting, **options)
-        return _mixed(given, last, False)
+        run = BASELINES[name](given.forward, given.exact, rng=rng, setting=setting, **options)
+        return _mixed(given, list(run), False)
     mdp = signed(given.planned)
     expert = Expert(np.r_[given.exact.mu, -given.exact.mu], np.zeros(2 * len(given.exact.mu)))
     span = 2 * float(np.abs(mdp.Phi).max()) / (1 - mdp.discount)
-    *_, last = BASELINES[name](
+    run = BASELINES[name](
         solver(mdp), expert, rng=rng, setting=Setting(False, span, mdp), **options
     )
-    return _mixed(given, last, True)
+    return _mixed(given, list(run), True)
 
 
-def _mixed(given: Given, last: Apprentice, is_signed: bool) -> Recovered:
-    """The mixture as one stationary policy where there are states, else as it is."""
+def _mixed(given: Given, run: list[Apprentice], is_signed: bool) -> Recovered:
+    """The mixture as one stationary policy where there are states, else as it is.
+
+    The log is the distance of the mixture's features to the expert's after each solve.
+    """
+    last, K = run[-1], len(given.exact.mu)
     info = {"solves": len(last.W), "mixture": last.mixture}
+    log: dict[str, Any] = {
+        "objective": np.array([np.linalg.norm((a.mu - a.mu_E)[:K]) for a in run]),
+        "iterates": last.W if last.W.shape[1] == K else last.W[:, :K] - last.W[:, K:],
+    }
     if given.is_finite:
         policy, _ = given.planned.stationary_policy(
             [r.policy for r in last.responses], last.mixture
         )
         mu = given.mdp.feature_expectations(policy)
-        return Recovered(policy=policy, mu=mu, status=last.status, info=info)
-    K = len(last.mu_E)
+        return Recovered(policy=policy, mu=mu, status=last.status, info=info, **log)
     return Recovered(
-        w=last.W[-1][:K],
+        w=last.W[-1],
         space="box" if is_signed else "simplex",
         policy=tuple(r.policy for r in last.responses),
         mu=last.mu,
         status=last.status,
         info=info,
+        **log,
     )

@@ -19,7 +19,6 @@ from walking_irl.baselines.recovered import from_start
 from walking_irl.cpirl import cpirl
 from walking_irl.errors import InvalidInputError
 from walking_irl.expert import check_expert
-from walking_irl.rl.chain import Chain
 from walking_irl.rl.demonstrations import Demonstrations
 from walking_irl.rl.finite_mdp import Actions, FiniteMDP
 from walking_irl.rl.tabular import best_policy, checked_policy
@@ -170,21 +169,25 @@ class Given:
             )
         return hook(self.data.demonstration)
 
-    def archive(self, rng: np.random.Generator, max_solves: int = ARCHIVE_SOLVES) -> Array:
-        """Features of policies that a recovery by CPIRL evaluates, shape (n, K).
+    def archive(
+        self, rng: np.random.Generator, max_solves: int = ARCHIVE_SOLVES
+    ) -> tuple[Array, int]:
+        """Features of policies that a recovery by CPIRL evaluates, (n, K), and its solves.
 
         By cuts alone: Newton's method would need too few policies to surround the expert.
         """
-        forward = self.forward
+        forward, n_solves = self.forward, 0
 
         def cuts_only(w: Array) -> Response:
+            nonlocal n_solves
+            n_solves += 1
             return replace(forward(w), sensitivity=None)
 
         run = cpirl(cuts_only, self.exact, mode="minimise", max_solves=max_solves, rng=rng)
         rows = []
         for it in run:
             rows += [it.response.mu[None], it.response.evaluated.reshape(-1, it.w.size)]
-        return np.concatenate(rows)
+        return np.concatenate(rows), n_solves
 
 
 def solver(mdp: FiniteMDP) -> Forward:
@@ -193,8 +196,9 @@ def solver(mdp: FiniteMDP) -> Forward:
 
     def forward(w: Array) -> Response:
         nonlocal pi
-        pi = best_policy(mdp, mdp.reward(w), pi=pi).pi
-        return Response(pi, mdp.Phi.T @ Chain(mdp, pi).solve_transposed(mdp.start))
+        best = best_policy(mdp, mdp.reward(w), pi=pi)
+        pi = best.pi
+        return Response(pi, mdp.Phi.T @ best.chain.solve_transposed(mdp.start))
 
     return forward
 

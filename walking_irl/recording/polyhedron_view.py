@@ -38,7 +38,7 @@ KEY_SOLID = ((0.95, -0.18, 0.95), (0.0, 0.0, -0.14))
 """Where the first name of further points stands, and from there the next one."""
 
 
-class _Point(NamedTuple):
+class Point(NamedTuple):
     """A point among the weights: a dot, or lines about it, which hide nothing behind them."""
 
     name: str
@@ -73,7 +73,7 @@ class PolyhedronView:
     def log_static(self, stream: rr.RecordingStream) -> None:
         """Log frames, names and styles."""
         for panel in self.panels:
-            _log_frame(stream, panel)
+            log_frame(stream, panel)
             if self._others and len(self.panels) == 1:
                 _log_key(stream, panel, self._others)
 
@@ -103,16 +103,16 @@ class PolyhedronView:
             for root in (panel.path, f"{panel.path}/lens"):
                 stream.log(f"{root}/query", rr.Clear(recursive=False))
 
-    def _points(self, it: Iteration, others: Sequence[Other]) -> list[_Point]:
+    def _points(self, it: Iteration, others: Sequence[Other]) -> list[Point]:
         points = [
-            _Point("query", it.w, style.LEARNER, 4.0),
-            _Point("estimate", it.estimate, style.ESTIMATE, lines=DIAMOND),
+            Point("query", it.w, style.LEARNER, 4.0),
+            Point("estimate", it.estimate, style.ESTIMATE, lines=DIAMOND),
         ]
         if self._others:
             shown = zip(self._others, others, style.OTHERS, strict=False)
-            points = [_Point(other_path(name), o.w, colour, 5.5) for name, o, colour in shown]
+            points = [Point(other_path(name), o.w, colour, 5.5) for name, o, colour in shown]
         if self._w_expert is not None:
-            points.append(_Point("truth", self._w_expert, style.EXPERT, lines=CROSS))
+            points.append(Point("truth", self._w_expert, style.EXPERT, lines=CROSS))
         return points
 
     def _log_panel(
@@ -120,12 +120,12 @@ class PolyhedronView:
         stream: rr.RecordingStream,
         clock: Clock,
         panel: Panel,
-        points: Sequence[_Point],
+        points: Sequence[Point],
         before: Hull,
         after: Hull,
     ) -> None:
         clock.set(stream)
-        lens = lens_of(panel, before, is_wide=bool(self._others) and len(self.panels) == 1)
+        lens = lens_of(panel, before.points, is_wide=bool(self._others) and len(self.panels) == 1)
         if lens is None:
             stream.log(f"{panel.path}/lens", rr.Clear(recursive=True))
         else:
@@ -139,7 +139,7 @@ class PolyhedronView:
                     np.abs(see(x) - see.place).max() <= LENS_RADIUS * 1.001
                 )
                 at = x if see is None else see(x)
-                _log_point(stream, root, point, at + lifted, is_seen)
+                log_point(stream, root, point, at + lifted, is_seen)
         self._fade(stream, clock, panel, before, after, lens)
 
     def _fade(
@@ -178,7 +178,8 @@ class PolyhedronView:
             clock.set(stream)
 
 
-def _log_frame(stream: rr.RecordingStream, panel: Panel) -> None:
+def log_frame(stream: rr.RecordingStream, panel: Panel) -> None:
+    """Log the corners of a panel and their names."""
     stream.log(panel.path, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     sides = np.array(list(combinations(panel.corners, 2)))
     lines = rr.LineStrips3D(sides, colors=[style.FRAME], radii=rr.Radius.ui_points([1.0]))
@@ -229,9 +230,8 @@ def _longest(edges: Array) -> Array:
     return chosen
 
 
-def _log_point(
-    stream: rr.RecordingStream, root: str, point: _Point, x: Array, is_seen: bool
-) -> None:
+def log_point(stream: rr.RecordingStream, root: str, point: Point, x: Array, is_seen: bool) -> None:
+    """Log a point at ``x`` of a picture, or nothing where it lies outside of a lens."""
     shape: rr.Points3D | rr.LineStrips3D
     if point.lines is None:
         radii = rr.Radius.ui_points([point.size])

@@ -39,7 +39,7 @@ class ProgressView:
         """Log names and styles of the curves, and the axes of the bars."""
         truth = self._experiment.w_expert is not None
         for name in self._experiment.names:
-            _log_style(
+            log_style(
                 stream,
                 weight_path(name),
                 ["lower", "query", "upper", "ground truth"][: 3 + truth],
@@ -47,13 +47,13 @@ class ProgressView:
                 [1.0, 2.0, 1.0, 1.5][: 3 + truth],
             )
             both = [f"{name} expert", f"{name} learner"]
-            _log_style(stream, feature_path(name), both, [style.EXPERT, style.LEARNER], [1.5, 2.0])
+            log_style(stream, feature_path(name), both, [style.EXPERT, style.LEARNER], [1.5, 2.0])
         for key, (label, colour) in FIGURES.items():
-            _log_style(stream, f"cpirl/{key}", [label], [colour], [2.0])
-            _log_style(stream, f"cpirl/log10/{key}", [label], [colour], [2.0])
+            log_style(stream, f"cpirl/{key}", [label], [colour], [2.0])
+            log_style(stream, f"cpirl/log10/{key}", [label], [colour], [2.0])
         for name, colour in zip(self._experiment.others, style.OTHERS, strict=False):
             for path in (distance_path(name), share_path(name)):
-                _log_style(stream, path, [name], [colour], [2.0])
+                log_style(stream, path, [name], [colour], [2.0])
         self._bars.log_static(stream)
 
     def log_iteration(
@@ -129,13 +129,14 @@ def line(it: Iteration) -> str:
     )
 
 
-def _log_style(
+def log_style(
     stream: rr.RecordingStream,
     path: str,
     names: list[str],
     colours: list[style.Colour],
     widths: list[float],
 ) -> None:
+    """Log names, colours and widths of an entity's curves."""
     lines = rr.SeriesLines(
         names=names, colors=colours, widths=widths, interpolation_mode="StepAfter"
     )

@@ -79,6 +79,8 @@ class Objectworld(FiniteDomain):
         objects: Where the objects are.
     """
 
+    view = "objectworld"
+
     def __init__(
         self,
         size: int = 16,

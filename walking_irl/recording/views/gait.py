@@ -151,7 +151,7 @@ class WalkerView:
         """One sentence for the summary."""
         ghost = " with the expert as a **red ghost**" if self.expert is not None else ""
         return (
-            f"the best gait for the weights queried{ghost}; they start each iteration together, "
+            f"the learner's gait{ghost}; they start each iteration together, "
             "and orange arrows are ground reaction forces"
         )
 

@@ -101,8 +101,8 @@ class LQRView:
         """One sentence for the summary."""
         also = ", **red** is the expert's" if self.expert is not None else ""
         return (
-            "every axis on its way from the start to zero under the best gains for the weights "
-            f"queried (**blue**{also}): above over time, below one axis over another"
+            "every axis on its way from the start to zero under the learner's gains "
+            f"(**blue**{also}): above over time, below one axis over another"
         )
 
     def _lines(self, picture: LQRPicture) -> Array:

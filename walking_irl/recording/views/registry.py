@@ -16,8 +16,9 @@ class World(NamedTuple):
     """A view, and what it is shown."""
 
     view: WorldView[Any]
-    motion: Callable[[Any, Array], Any]
-    """Maps a policy, and the weights that it is the best for, to what the view shows of it."""
+    motion: Callable[..., Any]
+    """Maps a policy, the weights that it is the best for (or None), and the reward of each state
+    (where it is not that of the weights) to what the view shows of it."""
 
 
 def world_of(domain: Any, shown: Demonstration | None = None) -> World | None:
@@ -35,7 +36,7 @@ def _walker(domain: Any, shown: Demonstration | None) -> World:
     from walking_irl.recording.views.gait import WalkerView
     from walking_irl.recording.views.motion import periodic_rollout
 
-    def motion(policy: Any, w: Array | None = None) -> Any:
+    def motion(policy: Any, w: Array | None = None, reward: Array | None = None) -> Any:
         return periodic_rollout(*domain.picture(policy))
 
     ghost = None if shown is None else motion(shown.policy)
@@ -43,15 +44,33 @@ def _walker(domain: Any, shown: Demonstration | None) -> World:
 
 
 def _gridworld(domain: Any, shown: Demonstration | None) -> World:
-    from walking_irl.recording.views.gridworld import GridMotion, GridworldView
+    from walking_irl.recording.views.gridworld import GridworldView
 
-    def motion(policy: Any, w: Array) -> GridMotion:
-        return GridMotion(domain.picture(policy), w)
+    motion, expert = _grid(domain, shown)
+    return World(GridworldView(domain.size, expert, regions=domain.regions), motion)
 
-    expert = None
-    if shown is not None and shown.truth is not None:
-        expert = motion(shown.policy, shown.truth.w)
-    return World(GridworldView(domain.size, expert), motion)
+
+def _objectworld(domain: Any, shown: Demonstration | None) -> World:
+    from walking_irl.recording.views.gridworld import GridworldView
+
+    motion, expert = _grid(domain, shown)
+    return World(GridworldView(domain.size, expert, objects=domain.objects), motion)
+
+
+def _grid(domain: Any, shown: Demonstration | None) -> tuple[Callable[..., Any], Any]:
+    """Policies and rewards on a square grid, and the expert's where they are known."""
+    from walking_irl.recording.views.gridworld import GridMotion
+
+    def motion(policy: Any, w: Array | None = None, reward: Array | None = None) -> GridMotion:
+        if reward is None and w is not None:
+            reward = domain.mdp.reward(w)
+        picture, shape = domain.picture(policy), (domain.size, domain.size)
+        seen = None if reward is None else np.reshape(reward, shape)
+        return GridMotion(picture.arrows, picture.visits, seen)
+
+    if shown is None or shown.truth is None:
+        return motion, None
+    return motion, motion(shown.policy, shown.truth.w)
 
 
 def _lqr(domain: Any, shown: Demonstration | None) -> World:
@@ -78,13 +97,14 @@ def _picture(domain: Any, shown: Demonstration | None) -> Any:
     return None if shown is None else domain.picture(shown.policy)
 
 
-def _motion(domain: Any) -> Callable[[Any, Array], Any]:
-    return lambda policy, w: domain.picture(policy)
+def _motion(domain: Any) -> Callable[..., Any]:
+    return lambda policy, w=None, reward=None: domain.picture(policy)
 
 
 VIEWS: dict[str | None, Callable[[Any, Demonstration | None], World]] = {
     "walker": _walker,
     "gridworld": _gridworld,
+    "objectworld": _objectworld,
     "lqr": _lqr,
     "walking-path": _walking_path,
     "driving": _driving,
