@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import rerun as rr
 
@@ -18,15 +20,31 @@ BARS = "polyhedron/intervals"
 RAISED = 0.33 * ROW
 """The viewer writes below a point; so much higher, text stands beside its line."""
 WIDTH = 1.72
-"""Of the whole picture, from the names' left end at -0.3 on."""
+"""Right end of the whole picture."""
 PLACE, HALF = 1.38, 0.25
 """Middle and half width of the magnified bars."""
 LEAST_ZOOM = 2.0
+LETTER, MOST_LETTERS = 0.025, 27
+"""Width of a letter in units of the axis, and how many of a name are shown."""
 
 
-def bounds(n_objectives: int) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Range in x and in y of the whole picture."""
-    return (-0.3, WIDTH), (-0.07, 1.12 * ROW * n_objectives)
+def bounds(names: Sequence[str]) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Range in x and in y of the whole picture; left of 0 there is room for the names."""
+    return (-_room(names), WIDTH), (-0.07, 1.12 * ROW * len(names))
+
+
+def _room(names: Sequence[str]) -> float:
+    """Width of the column of names, in units of the axis."""
+    return max(0.3, 0.06 + LETTER * max(len(shortened(name)) for name in names))
+
+
+def shortened(name: str) -> str:
+    """A name that leaves room for its bar.
+
+    >>> shortened("far from everything that stands in the way")
+    'far from everything that s…'
+    """
+    return name if len(name) <= MOST_LETTERS else name[: MOST_LETTERS - 1] + "…"
 
 
 class IntervalBars:
@@ -44,8 +62,9 @@ class IntervalBars:
         """Log rails, names, ticks and the ground truth."""
         y = self._y
         _log_rails(stream, "rails", 0.0, 1.0, y)
-        at = np.c_[np.full(len(y), -0.15), y - RAISED]
-        stream.log(f"{BARS}/names", text_2d(at, self._names), static=True)
+        at = np.c_[np.full(len(y), -_room(self._names) / 2), y - RAISED]
+        names = [shortened(name) for name in self._names]
+        stream.log(f"{BARS}/names", text_2d(at, names), static=True)
         ticks = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
         below = np.c_[ticks, np.full(5, y[-1] + 0.5 * ROW)]
         stream.log(f"{BARS}/ticks", text_2d(below, [f"{t:g}" for t in ticks]), static=True)

@@ -69,7 +69,7 @@ class Recorder(Generic[Motion]):
         self.path = check_writable(path, RecordingError)
         self.experiment = experiment
         self.world = world
-        self._polyhedron = PolyhedronView(experiment)
+        self._polyhedron = PolyhedronView(experiment, is_alone=world is None)
         self._progress = ProgressView(experiment)
         self._iterations: list[Iteration] = []
         self._n_frames = 0
@@ -138,6 +138,8 @@ class Recorder(Generic[Motion]):
         world = "" if self.world is None else self.world.describe()
         e, found = self.experiment, None
         if self._iterations:
+            end = Clock(self._n_frames - 1, self._iterations[-1].k)
+            self._progress.log_end(self._stream, end)
             found = summarise(self._iterations, e.expert, e.objectives)
         text = summary(e, found, world, ending)
         markdown = rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)
