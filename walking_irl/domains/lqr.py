@@ -21,6 +21,8 @@ from walking_irl.types import Expert, Objective, Response
 
 GAINS_OFF = 0.25
 """Relative error of a sub-optimal expert's gains."""
+PICTURE_STEPS = 16
+"""Of the trajectory that a picture shows."""
 
 
 class LQRPicture(NamedTuple):
@@ -153,7 +155,7 @@ class LQR(ExactDomain):
             raise SolverError(f"the least regret was not found: {result.message}")
         return float(result.fun)
 
-    def picture(self, policy: Array, n_steps: int = 16) -> LQRPicture:
+    def picture(self, policy: Array, n_steps: int = PICTURE_STEPS) -> LQRPicture:
         """``n_steps`` steps under gains ``policy``, shape (K,)."""
         k = np.asarray(policy, dtype=np.float64)
         states = self.start * (1 + k) ** np.arange(n_steps + 1.0)[:, None]

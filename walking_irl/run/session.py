@@ -128,7 +128,7 @@ def _learn(
                     recorded.show(it)
         if recorded is not None:
             with watch.part("recording"):
-                recorded.finale(_nearest(report))
+                recorded.finale(report.iterations, report.w)
 
 
 def _timed(problem: Problem, watch: Stopwatch, executor: Executor | None) -> Iterator[Iteration]:
@@ -170,8 +170,3 @@ def _keep(report: Report, n_known: int) -> None:
         report.checkpoint = str(path)
     except InvalidInputError as error:
         report.failed_write, report.checkpoint = error, None
-
-
-def _nearest(report: Report) -> Iteration:
-    """The query nearest to the recovered weights."""
-    return min(report.iterations, key=lambda it: float(np.abs(it.w - report.w).sum()))
