@@ -24,6 +24,12 @@ from walking_irl.rl.finite_mdp import Actions, FiniteMDP
 from walking_irl.rl.tabular import best_policy, checked_policy
 from walking_irl.types import Expert, Forward, Response
 
+HOOKS = {
+    "policy_gradient": "policies with parameters and the gradient of their features",
+    "advantages": "deviations from a policy whose features can be told",
+    "nearest": "policies with parameters that can be compared",
+}
+"""What a world may offer beside its solver, in words; see :mod:`walking_irl.domains.contract`."""
 ARCHIVE_SOLVES = 60
 """Forward solves of the CPIRL run whose policies are an archive, where none is given."""
 
@@ -157,17 +163,34 @@ class Given:
         Raises:
             InvalidInputError: If the world or the expert does not offer it.
         """
-        hook: Callable[[Any], Array] | None = getattr(self.world, "policy_gradient", None)
-        if hook is None:
-            raise InvalidInputError(
-                f"{self.method} needs policies with parameters and the gradient of their features, "
-                f"{self.name} offers no policy_gradient"
-            )
+        G: Array = self.offered("policy_gradient")(self.shown)
+        return G
+
+    @property
+    def shown(self) -> Any:
+        """The expert's policy, as the world has policies.
+
+        Raises:
+            InvalidInputError: If only features are known.
+        """
         if not isinstance(self.data, Expert) or self.data.demonstration is None:
             raise InvalidInputError(
                 f"{self.method} needs the expert's policy: give an Expert with its demonstration"
             )
-        return hook(self.data.demonstration)
+        return self.data.demonstration
+
+    def offered(self, hook: str) -> Callable[..., Any]:
+        """What a world may offer beside its solver, by name.
+
+        Raises:
+            InvalidInputError: If this one does not.
+        """
+        found: Callable[..., Any] | None = getattr(self.world, hook, None)
+        if found is None:
+            raise InvalidInputError(
+                f"{self.method} needs {HOOKS[hook]}, {self.name} offers no {hook}"
+            )
+        return found
 
     def archive(
         self, rng: np.random.Generator, max_solves: int = ARCHIVE_SOLVES

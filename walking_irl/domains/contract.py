@@ -104,6 +104,19 @@ class Demonstration:
     trajectories: tuple[Any, ...] = ()
 
 
+class Compared(NamedTuple):
+    """The optimal policy for some weights beside one that was shown, in the policy's parameters."""
+
+    residual: Array
+    """Shown minus optimal, shape (m,)."""
+    slope: Callable[[], Array]
+    """d optimal / d w, shape (m, K); asked for only by methods that use it."""
+    policy: Any
+    """The optimal policy."""
+    mu: Array
+    """Its feature expectations, shape (K,)."""
+
+
 @dataclass(frozen=True)
 class Learner:
     """A learner's tools; they know the expert's features, never its weights.
@@ -118,7 +131,17 @@ class Learner:
 
 
 class Domain(Protocol):
-    """A world with objectives, and a solver for the best policy under given weights."""
+    """A world with objectives, and a solver for the best policy under given weights.
+
+    Some methods of :mod:`walking_irl.baselines` ask for more, and run where it is offered:
+
+    - ``mdp``: the world as a finite MDP;
+    - ``policy_gradient(policy)``: gradient of each feature in the policy's parameters (p, K), along
+      the directions that its constraints leave;
+    - ``advantages(policy, *, size, rng)``: by how much the policy beats random deviations of a
+      relative size in each feature (n, K), and the state that each deviation belongs to (n,);
+    - ``nearest(policy)``: maps weights to their optimal policy beside that one, :class:`Compared`.
+    """
 
     @property
     def name(self) -> str:
