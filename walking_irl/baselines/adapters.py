@@ -81,8 +81,7 @@ def run_bilevel_search(given: Given, rng: Rng, **options: Any) -> Recovered:
 
 def _bilevel(method: Callable[..., Recovered], given: Given, **options: Any) -> Recovered:
     solve = given.offered("nearest")(given.shown)
-    least = getattr(getattr(given.world, "defaults", None), "min_weight", 0.0)
-    return method(solve, len(given.exact.mu), **{"min_weight": least, **options})
+    return method(solve, len(given.exact.mu), **{"min_weight": given.least, **options})
 
 
 def run_girl(given: Given, rng: Rng, **options: Any) -> Recovered:
@@ -140,6 +139,7 @@ def run_cpirl(
             centre=centre,
             mode=mode,  # type: ignore[arg-type]  # checked by cpirl
             max_solves=max_solves,
+            min_weight=0.0 if given.is_finite else given.least,
             rng=rng,
         )
     )
@@ -219,7 +219,7 @@ def _apprenticeship(
     """A mixture of policies: signed weights in finite worlds, the simplex elsewhere."""
     is_signed = given.is_finite and method is not BASELINES["kelley"]
     run = method(
-        given.forward,
+        given.oracle,
         given.exact,
         rng=rng,
         setting=Setting(is_signed=is_signed),
@@ -235,9 +235,9 @@ def _game(name: str, given: Given, rng: Rng, **options: Any) -> Recovered:
         if name == "lpal":
             given.mdp  # noqa: B018  # says why not
         corners = np.eye(len(given.exact.mu))
-        span = max(float(np.abs(given.forward(w).mu - given.exact.mu).max()) for w in corners)
+        span = max(float(np.abs(given.oracle(w).mu - given.exact.mu).max()) for w in corners)
         setting = Setting(False, span)
-        run = BASELINES[name](given.forward, given.exact, rng=rng, setting=setting, **options)
+        run = BASELINES[name](given.oracle, given.exact, rng=rng, setting=setting, **options)
         return _mixed(given, list(run), False)
     mdp = signed(given.planned)
     expert = Expert(np.r_[given.exact.mu, -given.exact.mu], np.zeros(2 * len(given.exact.mu)))

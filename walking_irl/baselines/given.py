@@ -179,6 +179,23 @@ class Given:
             )
         return self.data.demonstration
 
+    @property
+    def least(self) -> float:
+        """The world's lower bound of every weight."""
+        return float(getattr(getattr(self.world, "defaults", None), "min_weight", 0.0))
+
+    @property
+    def oracle(self) -> Forward:
+        """The solver, moved off the faces of the simplex where a world asks for that.
+
+        For methods whose queries are corners: where a weight vanishes the optimum may not exist.
+        """
+        forward = self.forward
+        share = float(getattr(getattr(self.world, "defaults", None), "interior", 0.0))
+        if self.is_finite or share == 0.0:
+            return forward
+        return lambda w: forward((1 - share) * w + share / len(w))
+
     def offered(self, hook: str) -> Callable[..., Any]:
         """What a world may offer beside its solver, by name.
 
@@ -206,7 +223,14 @@ class Given:
             n_solves += 1
             return replace(forward(w), sensitivity=None)
 
-        run = cpirl(cuts_only, self.exact, mode="minimise", max_solves=max_solves, rng=rng)
+        run = cpirl(
+            cuts_only,
+            self.exact,
+            mode="minimise",
+            max_solves=max_solves,
+            min_weight=self.least,
+            rng=rng,
+        )
         rows = []
         for it in run:
             rows += [it.response.mu[None], it.response.evaluated.reshape(-1, it.w.size)]

@@ -20,6 +20,9 @@ from walking_irl.errors import InvalidInputError
 from walking_irl.types import Expert, Forward, Objective, Response
 
 EXPERTS = ("optimal", "suboptimal")
+INTERIOR = 0.05
+"""Share of even weights that methods without a least weight ask for where a vanishing weight leaves
+the optimum ill-defined."""
 
 OnStep = Callable[[int, float], None]
 """Told of every step of a solver: its number and the cost so far."""
@@ -43,6 +46,8 @@ class Defaults(NamedTuple):
     """Budget of forward solves, probes left aside; what is cheap to solve may be solved often."""
     min_weight: float = 0.0
     """The learner's lower bound of every weight."""
+    interior: float = 0.0
+    """Share of even weights in queries on the simplex's faces, where an optimum is ill-defined."""
     needs_workers: bool = False
     """Whether a forward solve takes longer than to start a process."""
     files: str = ""

@@ -12,6 +12,7 @@ import numpy as np
 
 from walking_irl.arrays import Array, Indices
 from walking_irl.domains.contract import (
+    INTERIOR,
     Defaults,
     Demonstration,
     Learner,
@@ -110,7 +111,7 @@ class Humanoid:
     """
 
     options: Mapping[str, Option] = OPTIONS
-    defaults = Defaults(20, MIN_WEIGHT, needs_workers=True, files="walking")
+    defaults = Defaults(20, MIN_WEIGHT, INTERIOR, needs_workers=True, files="walking")
     view: str | None = "walker"
     has_trajectories = True
 

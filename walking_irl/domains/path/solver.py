@@ -80,9 +80,9 @@ def nearby_paths(z: Array, goal: Array, size: float, n: int, rng: np.random.Gene
         near[:, free] += steps
         for _ in range(MAX_NEWTON):
             near[:, free] -= (integrate(near).end - target) @ back.T
+            near = np.clip(near, lo, hi)
         walks = integrate(near)
         arrives = np.abs(walks.end - target).max(axis=1) <= RESIDUAL
-        arrives &= ((near >= lo) & (near <= hi)).all(axis=1)
         found = np.concatenate([found, costs(walks, goal)[arrives]])
         if len(found) >= n:
             return found[:n]

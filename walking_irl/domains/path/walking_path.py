@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from walking_irl.arrays import Array, Indices
-from walking_irl.domains.contract import Compared, Defaults, Option
+from walking_irl.domains.contract import INTERIOR, Compared, Defaults, Option
 from walking_irl.domains.exact import ExactDomain
 from walking_irl.domains.path.model import costs, integrate
 from walking_irl.domains.path.solver import (
@@ -88,7 +88,7 @@ class WalkingPath(ExactDomain):
     name = "walking-path"
     objectives: tuple[Objective, ...] = OBJECTIVES
     options = OPTIONS
-    defaults = Defaults(needs_workers=True)
+    defaults = Defaults(interior=INTERIOR, needs_workers=True)
     view = "walking-path"
 
     def __init__(
