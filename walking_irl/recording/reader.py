@@ -175,7 +175,7 @@ def _check_file(path: Path) -> Path:
     if not path.exists():
         raise RecordingError(f"there is no recording {path}; check the name")
     if not path.is_file():
-        raise RecordingError(f"expected a recording file, {path} is a folder or a device")
+        raise RecordingError(f"expected a recording file, {path} is a folder, a pipe or a device")
     try:
         with path.open("rb") as file:
             start = file.read(len(MAGIC))

@@ -28,10 +28,12 @@ def summary(
     parts = [f"# {experiment.question or f'What does the expert of {experiment.domain} want?'}"]
     if ending is not None:
         parts.append(f"**The run was cut short: {ending}.** What was done until then is here.")
-    if found is not None:
+    if experiment.answer:
+        parts.append(experiment.answer)
+    elif found is not None:
         parts += [_result(experiment, found), _table(experiment, found)]
     parts += ["## How to read it", _legend(experiment, world)]
-    if found is not None:
+    if found is not None and not experiment.answer:
         parts += ["## How sure it is", _certainty(experiment, found)]
     parts += ["## Objectives", "\n".join(f"* {o.name}: {o.meaning}" for o in experiment.objectives)]
     return "\n\n".join(parts)

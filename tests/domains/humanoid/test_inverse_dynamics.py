@@ -161,8 +161,7 @@ BY = ("qq", "qv", "qa", "vv", "va", "aa")
 
 def curvature(d, lam, sigma):
     """Second derivatives by blocks: {"qv": (N, nv, nv), ...}."""
-    half, nv = d.half_curvature(lam, sigma), lam.shape[1]
-    whole = half + half.swapaxes(1, 2)
+    whole, nv = d.curvature(lam, sigma).matrix(), lam.shape[1]
     at = {name: slice(k * nv, (k + 1) * nv) for k, name in enumerate("qva")}
     return {by: whole[:, at[by[0]], at[by[1]]] for by in BY}
 
@@ -203,8 +202,8 @@ def test_curvature_is_linear_in_its_multipliers(variant):
     """The packed products mix nothing up between classes."""
     model, d = gait_of(variant)[0], differentiated(variant)[1]
     parts = list(multipliers(model))
-    whole = d.half_curvature(sum(p[1] for p in parts), sum(p[2] for p in parts))
-    summed = sum(d.half_curvature(lam, sigma) for _, lam, sigma in parts)
+    whole = d.curvature(sum(p[1] for p in parts), sum(p[2] for p in parts)).matrix()
+    summed = sum(d.curvature(lam, sigma).matrix() for _, lam, sigma in parts)
     np.testing.assert_allclose(whole, summed, atol=1e-11 * np.abs(summed).max())
 
 
@@ -249,7 +248,7 @@ def test_models_without_closed_form_fall_back_and_say_why(spoil, reason):
     numeric = FiniteDifferences(model, q[:2], v[:2], a[:2])
     for block in BLOCKS:
         np.testing.assert_array_equal(getattr(d, block), getattr(numeric, block))
-    assert d.half_curvature(np.zeros((2, model.nv)), np.zeros((2, model.nsensordata))) is None
+    assert d.curvature(np.zeros((2, model.nv)), np.zeros((2, model.nsensordata))) is None
 
 
 BALL = """<mujoco><worldbody><body><joint type="ball"/><geom size=".1" mass="1"/></body></worldbody>

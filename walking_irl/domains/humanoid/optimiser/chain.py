@@ -33,7 +33,7 @@ class Multipliers(NamedTuple):
     outputs: Array
     """Of root forces in their units, torques and the sensors read, shape (N, R)."""
     coordinates: Array
-    """Of q, v and a at fixed outputs, shape (N, 3 nv)."""
+    """Of q, v and a at fixed outputs, shape (3, N, nv)."""
     h: float
     length: float
     """Of the duration of a step and of the step length, at fixed outputs and coordinates."""
@@ -49,19 +49,18 @@ class Chain:
 
     Attributes:
         rows: Derivatives of root forces in their units, torques and the sensors of
-            ``problem.sensors`` with respect to q, v and a: shape (N, R, 3 nv).
+            ``problem.sensors`` with respect to q, v and a: shape (3, N, R, nv).
     """
 
     def __init__(self, problem: Transcription, ev: Evaluation, d: Derivatives) -> None:
         self.problem, self.evaluation = problem, ev
         nv, sensors = problem.nv, problem.sensors
         self.feet = np.searchsorted(sensors, problem.feet)
-        self.rows = np.empty((problem.n_knots, nv + len(sensors), 3 * nv))
+        self.rows = np.empty((3, problem.n_knots, nv + len(sensors), nv))
         parts = ((d.tau_q, d.s_q), (d.tau_v, d.s_v), (d.tau_a, d.s_a))
-        for b, (force, sensor) in enumerate(parts):
-            self.rows[:, :nv, b * nv : (b + 1) * nv] = force
-            self.rows[:, nv:, b * nv : (b + 1) * nv] = sensor[:, sensors]
-        self.rows[:, : problem.walker.n_root] /= problem.root_unit[:, None]
+        for rows, (force, sensor) in zip(self.rows, parts, strict=True):
+            rows[:, :nv], rows[:, nv:] = force, sensor[:, sensors]
+        self.rows[:, :, : problem.walker.n_root] /= problem.root_unit[:, None]
 
     def forward(self, dx: Array) -> Outputs:
         """Change of the outputs for a change ``dx`` of the unknowns."""
@@ -75,7 +74,7 @@ class Chain:
         v = np.vstack([m.v, m.v_next[-1:]])
         dv = np.diff(np.vstack([before, dq, after]), axis=0) / h - v * (dh / h)
         da = np.diff(dv, axis=0) / h - m.a * (dh / h)
-        out = (self.rows @ np.hstack([dq, dv[:-1], da])[..., None])[..., 0]
+        out = (self.rows @ np.stack([dq, dv[:-1], da])[..., None])[..., 0].sum(0)
         tau, s = out[:, walker.n_root : nv], np.zeros_like(m.s)
         s[:, p.sensors] = out[:, nv:]
         tau_last = walker.torque_mirror @ tau[0]
@@ -107,22 +106,21 @@ class Chain:
         s[n // 2, p.feet] += [y.align, -y.align]
         return Multipliers(
             outputs=np.hstack([y.root, tau, s[:, p.sensors]]),
-            coordinates=np.hstack([c.q, c.v + c.v_next, c.a + m.h * c.v_next]),
+            coordinates=np.stack([c.q, c.v + c.v_next, c.a + m.h * c.v_next]),
             h=c.h + float(np.vdot(c.v_next, m.a)),  # v_next = v + h a
             length=float(walker.sensor_advance @ c.s_next[-1]),
         )
 
     def by_coordinates(self, y: Multipliers) -> Array:
-        """Gradient with respect to q, v and a of every knot, shape (N, 3 nv)."""
-        return np.asarray(y.coordinates + (y.outputs[:, None] @ self.rows)[:, 0])
+        """Gradient with respect to q, v and a of every knot, shape (3, N, nv)."""
+        return np.asarray(y.coordinates + (y.outputs[:, None] @ self.rows)[:, :, 0])
 
     def backward(self, y: Outputs) -> Array:
         """Gradient with respect to the unknowns of ``y`` . outputs, shape (N nv + 2,)."""
         p, m = self.problem, self.evaluation.motion
         n, nv, h, mirror = p.n_knots, p.nv, m.h, p.walker.mirror
         folded = self.fold(y)
-        u = self.by_coordinates(folded)
-        by_v, a = u[:, nv : 2 * nv], u[:, 2 * nv :]
+        by_q, by_v, a = self.by_coordinates(folded)
         dh = folded.h - (float(np.vdot(by_v, m.v)) + 2 * float(np.vdot(a, m.a))) / h
         v = np.zeros((n + 1, nv))
         v[:-1] = by_v - a / h
@@ -130,7 +128,7 @@ class Chain:
         ring = np.zeros((n + 2, nv))
         ring[1:] = v / h
         ring[:-1] -= v / h
-        q = u[:, :nv] + ring[1:-1]
+        q = by_q + ring[1:-1]
         q[-1] += mirror.T @ ring[0]
         q[0] += mirror.T @ ring[-1]
         d_length = folded.length + float(ring[-1, 0] - ring[0, 0])

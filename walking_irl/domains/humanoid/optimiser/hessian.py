@@ -21,13 +21,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from walking_irl.arrays import Array
+from walking_irl.arrays import Array, Indices
 from walking_irl.domains.humanoid.optimiser.chain import Multipliers, Outputs
+from walking_irl.domains.humanoid.optimiser.dynamics.inverse import Curvature
 from walking_irl.domains.humanoid.optimiser.linearisation import Weighted
 from walking_irl.domains.humanoid.optimiser.pairs import Knots, Pairs
 from walking_irl.domains.humanoid.optimiser.ring import BorderedMatrix, Ring
 from walking_irl.domains.humanoid.optimiser.transcription import Transcription
-from walking_irl.domains.humanoid.optimiser.windows import Assembly, Windows
+from walking_irl.domains.humanoid.optimiser.windows import Assembly, Own, Windows
 
 
 class Structure:
@@ -44,7 +45,7 @@ class Structure:
 
 
 class _Global(NamedTuple):
-    """Second derivatives by h and L: with coordinates (2, N, 3 nv), and with each other (2, 2)."""
+    """Second derivatives by h and L: with coordinates (2, 3, N, nv), and with each other (2, 2)."""
 
     columns: Array
     corner: Array
@@ -65,23 +66,24 @@ def half_hessian(
     lin = at.lin
     pairs, m = structure.pairs, lin.evaluation.motion
     numbers = pairs.numbers(_second_by_reads(at, is_exact), m.h, m.a)
-    K = _half_by_slots(at, pairs, numbers)
-    glob = _by_globals(at, pairs, numbers)
     windows = Windows(m.v, m.a, m.h, lin.problem.walker.mirror)
-    gradient = None
+    assembly = Assembly(windows)
+    _add_moving(assembly, at, pairs, numbers)
+    glob = _by_globals(at, pairs, numbers)
+    gradient = bent = None
     if is_exact:
         multipliers, v_next = _multipliers(at, root)
-        bent = _half_curvature(at, multipliers)
-        if bent is not None:
-            K += bent
-        glob.columns[0, :, 2 * m.v.shape[1] :] += v_next  # v_next = v + h a
+        bent = _curvature(at, multipliers)
+        glob.columns[0, 2] += v_next  # v_next = v + h a
         gradient = lin.chain.by_coordinates(multipliers)
-    K = K + K.mT
-    pairs.uu.add(numbers, K)
-    assembly = Assembly(windows)
-    assembly.add_own(K)
-    _add_ahead(assembly, at, pairs, numbers)
-    _add_ends(assembly, K, glob, gradient)
+    own = Own(windows, bent)
+    if len(pairs.uu.target):
+        own.add_pairs(pairs.uu.dense(numbers), *pairs.joints)
+    own.add_row(pairs.knots.n // 2, _align(at))
+    assembly.add_own(own)
+    still = lin.chain.rows[0][:, pairs.still]
+    assembly.add_still(still, pairs.ss.dense(numbers), pairs.s_ahead.dense(numbers))
+    _add_ends(assembly, own.column, glob, gradient)
     _add_per_metre(assembly, at, is_exact)
     f = at.factors.anchors
     assembly.blocks[0, 0, 0, 0] += f[0] ** 2
@@ -108,34 +110,38 @@ def _second_by_reads(at: Weighted, is_exact: bool) -> Array:
     return np.concatenate(out)
 
 
-def _half_by_slots(at: Weighted, pairs: Pairs, numbers: Array) -> Array:
-    """K of the outputs without curvature, its transpose yet to be added; (N, 3 nv, 3 nv)."""
-    lin = at.lin
-    rows, knots = lin.chain.rows, pairs.knots
-    nv, middle = knots.nv, knots.n // 2
-    dynamic, static = rows[:, pairs.dynamic], rows[:, pairs.static, :nv]
-    C = pairs.dd.dense(numbers)
-    i = np.arange(knots.n_root)
+def _add_moving(assembly: Assembly, at: Weighted, pairs: Pairs, numbers: Array) -> None:
+    """Add what the moving outputs add, without their own curvature."""
+    rows = _rows_of(at, pairs, pairs.moving)
+    C = pairs.mm.dense(numbers)
+    i = np.arange(pairs.knots.n_root)
     C[:, i, i] += at.factors.root[0] ** 2
-    X = (0.5 * C) @ dynamic
-    pairs.du.add(numbers, X)
-    if len(pairs.ds.target):
-        X[..., :nv] += pairs.ds.dense(numbers) @ static
-    K = dynamic.mT @ X
-    X = pairs.su.dense(numbers)
-    X[..., :nv] += (0.5 * pairs.ss.dense(numbers)) @ static
-    K[:, :nv] += static.mT @ X
-    left, right = rows[middle, nv + lin.chain.feet]
-    align = (left - right) * at.factors.anchors[1]
-    K[middle] += 0.5 * np.outer(align, align)
-    return np.asarray(K)
+    X = (0.5 * C) @ rows
+    pairs.mu.add(numbers, X)
+    left, right = assembly.windows.columns(rows), assembly.windows.columns(X, 4)
+    left.close()
+    if len(pairs.m_ahead.target):
+        A = pairs.m_ahead.dense(numbers)
+        behind = np.stack([A, np.roll(A, 1, axis=0), np.roll(A, 2, axis=0)], axis=1)
+        right.by_knot[: len(A), 1:] += behind @ left.by_knot[: len(A)]
+        right.ends[:] += A @ np.roll(left.ends, -1, axis=0)
+    right.close()
+    assembly.add_moving(left, right)
+
+
+def _align(at: Weighted) -> Array:
+    """The row of the feet's distance at mid-step by the coordinates of its knot, (3, nv)."""
+    problem, chain = at.lin.problem, at.lin.chain
+    left, right = np.moveaxis(chain.rows[:, problem.n_knots // 2, problem.nv + chain.feet], 1, 0)
+    return np.asarray((left - right) * at.factors.anchors[1])
 
 
 def _by_globals(at: Weighted, pairs: Pairs, numbers: Array) -> _Global:
     rows, R = at.lin.chain.rows, pairs.knots.outputs
     local = pairs.global_local.dense(numbers)
-    columns = local[..., R:] + (local[:, :, None, :R] @ rows)[:, :, 0]
-    return _Global(columns, pairs.global_global.dense(numbers))
+    by_output = (local[:, None, :, None, :R] @ rows)[..., 0, :]
+    own = np.moveaxis(local[..., R:].reshape(*local.shape[:2], 3, -1), 2, 1)
+    return _Global(own + by_output, pairs.global_global.dense(numbers))
 
 
 def _multipliers(at: Weighted, root: Array | None) -> tuple[Multipliers, Array]:
@@ -147,57 +153,50 @@ def _multipliers(at: Weighted, root: Array | None) -> tuple[Multipliers, Array]:
     return folded, channels.v_next
 
 
-def _half_curvature(at: Weighted, y: Multipliers) -> Array | None:
-    """Half the outputs' own second derivatives, if there is a closed form; (N, 3 nv, 3 nv)."""
+def _curvature(at: Weighted, y: Multipliers) -> Curvature | None:
+    """The outputs' own second derivatives times half their multipliers, if they are known."""
     p = at.lin.problem
     lam = y.outputs[:, : p.nv].copy()
     lam[:, : p.walker.n_root] /= p.root_unit
     sigma = np.zeros((p.n_knots, p.walker.model.nsensordata))
     sigma[:, p.sensors] = y.outputs[:, p.nv :]
-    return at.lin.derivatives.half_curvature(lam, sigma)
+    return at.lin.derivatives.curvature(lam, sigma)
 
 
-def _add_ahead(assembly: Assembly, at: Weighted, pairs: Pairs, numbers: Array) -> None:
-    if not len(pairs.ahead.target):
-        return
-    sides = [_rows_of(at, pairs, slots) for slots in (pairs.ahead_rows, pairs.ahead_columns)]
-    assembly.add_ahead(sides[0], pairs.ahead.dense(numbers), sides[1])
-
-
-def _rows_of(at: Weighted, pairs: Pairs, slots: Array) -> Array:
-    """Derivatives of some slots by the coordinates of their knot, shape (N, m, 3 nv)."""
+def _rows_of(at: Weighted, pairs: Pairs, slots: Indices) -> Array:
+    """Derivatives of some slots by the coordinates of their knot, shape (3, N, m, nv)."""
     rows, R = at.lin.chain.rows, pairs.knots.outputs
-    if (slots < R).all():
-        return rows[:, slots]
-    out = np.zeros((len(rows), len(slots), rows.shape[2]))
-    for k, slot in enumerate(slots):
-        if slot < R:
-            out[:, k] = rows[:, slot]
-        else:
-            out[:, k, slot - R] = 1.0
+    of_output = slots < R
+    if of_output.all():
+        return np.asarray(rows.take(slots, axis=2))
+    out = np.zeros((3, rows.shape[1], len(slots), rows.shape[3]))
+    out[:, :, of_output] = rows[:, :, slots[of_output]]
+    for k in np.flatnonzero(~of_output):
+        kind, joint = divmod(int(slots[k]) - R, rows.shape[3])
+        out[kind, :, k, joint] = 1.0
     return out
 
 
-def _add_ends(assembly: Assembly, K: Array, glob: _Global, gradient: Array | None) -> None:
+def _add_ends(assembly: Assembly, own: Array, glob: _Global, gradient: Array | None) -> None:
     """Add the columns of L and T.
 
     Args:
         assembly: Where to.
-        K: Second derivatives of every knot by its coordinates.
-        glob: The same by h and L.
-        gradient: First derivatives by coordinates, (N, 3 nv), if second derivatives of v and a by
+        own: Second derivatives of every knot by its coordinates, times those by T, (3, N, nv).
+        glob: Second derivatives by h and L.
+        gradient: First derivatives by coordinates, (3, N, nv), if second derivatives of v and a by
             T enter.
     """
     windows = assembly.windows
-    n, nv, T, by_T = windows.n, windows.nv, windows.T, windows.by_T
+    n, T, by_T = windows.n, windows.T, windows.by_T
     by_h, by_L = glob.columns
-    column = (K @ by_T[..., None])[..., 0] + by_h / n
+    column = own + by_h / n
     corner = float(np.vdot(by_T, column) + np.vdot(by_T, by_h) / n) + glob.corner[0, 0] / n**2
     if gradient is not None:  # d^2 v/dT^2 = 2 v/T^2 = -2/T dv/dT, of a 6 a/T^2 = -3/T da/dT
-        column[:, nv : 2 * nv] -= gradient[:, nv : 2 * nv] / T
-        column[:, 2 * nv :] -= gradient[:, 2 * nv :] * (2 / T)
-        bend = gradient * by_T
-        corner -= float(2 * bend[:, nv : 2 * nv].sum() + 3 * bend[:, 2 * nv :].sum()) / T
+        column[1] -= gradient[1] / T
+        column[2] -= gradient[2] * (2 / T)
+        bend = np.vdot(gradient[1], by_T[1]), np.vdot(gradient[2], by_T[2])
+        corner -= float(2 * bend[0] + 3 * bend[1]) / T
     assembly.add_own_column(by_L, 0)
     assembly.add_own_column(column, 1)
     mixed = float(np.vdot(by_T, by_L)) + glob.corner[0, 1] / n

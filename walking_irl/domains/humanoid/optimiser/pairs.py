@@ -17,7 +17,7 @@ from walking_irl.domains.humanoid.costs.base import Read
 from walking_irl.domains.humanoid.costs.stack import CostStack
 
 GLOBALS = ("h", "L")
-_LOCAL, _AHEAD = 0, 1
+_MOVING, _STILL, _OWN, _GLOBAL = range(4)
 
 
 class Knots(NamedTuple):
@@ -77,20 +77,23 @@ class Scatter(NamedTuple):
 class Pairs:
     """Second derivatives of the residuals' half squares by pairs of slots.
 
-    Outputs are sorted into dynamic (d) and static ones (s); u are the coordinates of the knot.
+    Outputs are sorted into still ones (s), which depend on q alone and go together with such
+    outputs only, and moving ones (m); u are the coordinates of the knot.
 
     Attributes:
-        dynamic, static: Outputs of each kind.
-        dd, ds, ss, du, su, uu: Same knot, shapes (N, n, n'): both orders where the kinds agree.
+        moving: Slots of the moving outputs, then of coordinates that go with a knot ahead.
+        still: Slots of the still outputs.
+        mm, ss: Same knot, shapes (N, n, n).
+        mu: Moving outputs with coordinates, shape (3, N, n, nv).
+        uu: Coordinates of the pairs ``joints`` of joints, shape (N, n, 3, 3).
         global_local: Shape (2, N, size), globals in the order of GLOBALS.
         global_global: Shape (2, 2).
-        ahead: Slots ``ahead_rows`` of knot i with ``ahead_columns`` of knot i + 1, (N, n, n').
+        m_ahead: Of knot i with knot i + 1, both among ``moving``, shape (N, n, n).
+        s_ahead: The same among ``still``.
     """
 
     def __init__(self, stack: CostStack, knots: Knots) -> None:
         self.stack, self.knots = stack, knots
-        self.dynamic = np.flatnonzero(~knots.is_static)
-        self.static = np.flatnonzero(knots.is_static)
         found = [self._of_place(*t) for t in self._terms()]
         none = [np.zeros(0, int)] * 7 + [np.zeros(0)]
         self._layout(*(np.concatenate(x) for x in zip(none, *found, strict=True)))
@@ -171,58 +174,61 @@ class Pairs:
     ) -> None:
         """Sort the pairs into scatters; a pair of two kinds is kept in one order only."""
         k = self.knots
-        kind, place = self._kinds()
+        is_still = self._still(slot[sign != 0], slot2[sign != 0])
+        kind, place = _kinds(is_still, 3 * k.nv)
         left, right = kind[slot], kind[slot2]
-        same = knot == knot2
-        chosen, scatters = [], {}
-        count = [len(self.dynamic), len(self.static), 3 * k.nv]
-        edge = 0
+        chosen, edge = [], 0
 
-        def sort(name: str, mask: Flags, flat: Indices, shape: tuple[int, ...]) -> None:
+        def sort(mask: Flags, flat: Indices, shape: tuple[int, ...]) -> Scatter:
             nonlocal edge
-            mask = mask & (sign != 0)
-            index = np.flatnonzero(mask)
+            index = np.flatnonzero(mask & (sign != 0))
             target, inverse = np.unique(flat[index], return_inverse=True)
-            scatters[name] = Scatter(slice(edge, edge + len(index)), inverse, target, shape)
             chosen.append(index)
-            edge += len(index)
+            start, edge = edge, edge + len(index)
+            return Scatter(slice(start, edge), inverse, target, shape)
 
-        for name, (a, b) in zip(
-            ("dd", "ds", "ss", "du", "su", "uu"),
-            ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)),
-            strict=True,
-        ):
-            flat = (knot * count[a] + place[slot]) * count[b] + place[slot2]
-            shape = (k.n, count[a], count[b])
-            sort(name, same & (left == a) & (right == b), flat, shape)
-        is_global, is_global2 = left == 3, right == 3
+        is_global, is_global2 = left == _GLOBAL, right == _GLOBAL
         flat = (place[slot] * k.n + knot2) * k.size + slot2
-        sort("global_local", is_global & ~is_global2, flat, (2, k.n, k.size))
-        sort("global_global", is_global & is_global2, place[slot] * 2 + place[slot2], (2, 2))
-        is_ahead = ~is_global & ~is_global2 & (knot2 == (knot + 1) % k.n) & ~same
-        self.ahead_rows, rows = np.unique(slot[is_ahead], return_inverse=True)
-        self.ahead_columns, columns = np.unique(slot2[is_ahead], return_inverse=True)
-        shape = (k.n, len(self.ahead_rows), len(self.ahead_columns))
+        self.global_local = sort(is_global & ~is_global2, flat, (2, k.n, k.size))
+        flat = place[slot] * 2 + place[slot2]
+        self.global_global = sort(is_global & is_global2, flat, (2, 2))
+        same, is_local = knot == knot2, ~is_global & ~is_global2
+        is_ahead = is_local & (knot2 == (knot + 1) % k.n) & ~same
+        is_moving = is_ahead & ~((left == _STILL) & (right == _STILL))
+        moving = np.flatnonzero(~is_still)
+        extra = np.concatenate([slot[is_moving], slot2[is_moving]])
+        self.moving, self.still = np.union1d(moving, extra), np.flatnonzero(is_still)
+        m, s, nv = len(self.moving), len(self.still), k.nv
+        at, at2 = place[slot], place[slot2]
+        both = (same, left, right)
+        self.mm = sort(_are(both, _MOVING, _MOVING), (knot * m + at) * m + at2, (k.n, m, m))
+        self.ss = sort(_are(both, _STILL, _STILL), (knot * s + at) * s + at2, (k.n, s, s))
+        (kind2, joint2), (kind1, joint1) = np.divmod(at2, nv), np.divmod(at, nv)
+        flat = ((kind2 * k.n + knot) * m + at) * nv + joint2
+        self.mu = sort(_are(both, _MOVING, _OWN), flat, (3, k.n, m, nv))
+        is_own = _are(both, _OWN, _OWN)
+        pairs, pair = np.unique((joint1 * nv + joint2)[is_own], return_inverse=True)
+        self.joints = np.divmod(pairs, nv)
         flat = np.zeros(len(slot), int)
-        flat[is_ahead] = (knot[is_ahead] * shape[1] + rows) * shape[2] + columns
-        sort("ahead", is_ahead, flat, shape)
-        self.dd, self.ds, self.ss = (scatters[name] for name in ("dd", "ds", "ss"))
-        self.du, self.su, self.uu = (scatters[name] for name in ("du", "su", "uu"))
-        self.global_local, self.global_global = scatters["global_local"], scatters["global_global"]
-        self.ahead = scatters["ahead"]
+        flat[is_own] = ((knot * len(pairs))[is_own] + pair) * 9 + (3 * kind1 + kind2)[is_own]
+        self.uu = sort(is_own, flat, (k.n, len(pairs), 3, 3))
+        row, row2 = (np.searchsorted(self.moving, x) for x in (slot, slot2))
+        self.m_ahead = sort(is_moving, (knot * m + row) * m + row2, (k.n, m, m))
+        self.s_ahead = sort(is_ahead & ~is_moving, (knot * s + at) * s + at2, (k.n, s, s))
         order = np.concatenate(chosen)
         self._source, self._sign = source[order], sign[order]
         self._factors = factor[order], factor2[order]
 
-    def _kinds(self) -> tuple[Indices, Indices]:
-        """Kind of every slot (dynamic, static, coordinate, global), and its place among them."""
+    def _still(self, slot: Indices, slot2: Indices) -> Flags:
+        """Which outputs depend on q alone and go together with no other outputs, shape (R,)."""
         k = self.knots
-        kind = np.concatenate([k.is_static.astype(int), np.full(3 * k.nv, 2), [3, 3]])
-        place = np.empty(len(kind), int)
-        for value in range(4):
-            mine = kind == value
-            place[mine] = np.arange(mine.sum())
-        return kind, place
+        is_still = np.concatenate([k.is_static, np.zeros(3 * k.nv + len(GLOBALS), bool)])
+        is_free = np.arange(len(is_still)) >= k.size  # globals go with everything
+        while True:
+            mixed = is_still[slot] & ~is_still[slot2] & ~is_free[slot2]
+            if not mixed.any():
+                return is_still[: k.outputs]
+            is_still[slot[mixed]] = False
 
     def numbers(self, values: Array, h: float, a: Array) -> Array:
         """What the scatters sum.
@@ -235,3 +241,20 @@ class Pairs:
         factors = np.concatenate([[1.0, h], a.ravel()])
         left, right = self._factors
         return np.asarray(values[self._source] * self._sign * factors[left] * factors[right])
+
+
+def _are(both: tuple[Flags, Indices, Indices], kind: int, kind2: int) -> Flags:
+    """Which pairs of slots of the same knot are of two kinds."""
+    same, left, right = both
+    return np.asarray(same & (left == kind) & (right == kind2))
+
+
+def _kinds(is_still: Flags, coordinates: int) -> tuple[Indices, Indices]:
+    """Kind of every slot, and its place among them; ``is_still`` of the outputs."""
+    outputs = np.where(is_still, _STILL, _MOVING)
+    kind = np.concatenate([outputs, np.full(coordinates, _OWN), np.full(len(GLOBALS), _GLOBAL)])
+    place = np.empty(len(kind), int)
+    for value in (_MOVING, _STILL, _OWN, _GLOBAL):
+        mine = kind == value
+        place[mine] = np.arange(mine.sum())
+    return kind, place

@@ -20,7 +20,12 @@ REACH = 4
 
 
 class Ring:
-    """Order of the knots in which the ring is a band, and where blocks go in LAPACK's storage."""
+    """Order of the knots in which the ring is a band, and where blocks go in LAPACK's storage.
+
+    Stored column by column, the lower band is an ordinary matrix whose columns are one number
+    shorter than the storage's: a block is a strided view of it, and so are the blocks of knots that
+    follow one another at an equal distance.
+    """
 
     def __init__(self, n: int, nv: int) -> None:
         if n < 2 * REACH:
@@ -30,24 +35,52 @@ class Ring:
         place = np.empty(n, dtype=int)
         place[order] = np.arange(n)
         self.permutation: Indices = (np.array(order)[:, None] * nv + np.arange(nv)).ravel()
-        d, k = np.divmod(np.arange(REACH * n), n)
-        row, column = (place[x][:, None, None] * nv for x in (k, (k + d) % n))
-        i, j = np.arange(nv)[:, None], np.arange(nv)
-        r, c = np.broadcast_arrays(row + i, column + j)
-        kept = (r >= c) | (d > 0)[:, None, None]
-        low, high = np.minimum(r, c)[kept], np.maximum(r, c)[kept]
-        self.bandwidth = int(np.max(high - low))
-        self._target: Indices = low * (self.bandwidth + 1) + high - low
-        self._source: Indices = np.flatnonzero(kept)
+        ahead = place[(np.arange(n) + np.arange(REACH)[:, None]) % n]  # (REACH, N)
+        self.bandwidth = int(np.abs(ahead - place).max() + 1) * nv - 1
+        self._kept = np.triu(np.ones((nv, nv)))  # of a symmetric block, else beyond the band
+        self._runs = [run for d in range(REACH) for run in _runs(d, place, ahead[d])]
 
     def band(self, blocks: Array) -> Array:
         """Lower band (bandwidth + 1, N nv) of blocks (REACH, N, nv, nv).
 
         ``blocks[d, k]`` couples the knots k (rows) and k + d (columns).
         """
-        flat = np.zeros(self.size * (self.bandwidth + 1))
-        flat[self._target] = blocks.reshape(-1)[self._source]
-        return flat.reshape(self.size, self.bandwidth + 1).T
+        nv, length = self.nv, self.bandwidth
+        flat = np.zeros(self.size * (length + 1))
+        for run in self._runs:
+            x = blocks[run.d, run.knots]
+            if run.d == 0:
+                x = x * self._kept
+            corner = nv * (min(run.row, run.column) * length + max(run.row, run.column))
+            inner = (length, 1) if run.row <= run.column else (1, length)
+            strides = np.array([run.step * nv * (length + 1), *inner]) * flat.itemsize
+            np.lib.stride_tricks.as_strided(flat[corner:], x.shape, strides)[:] = x
+        return flat.reshape(self.size, length + 1).T
+
+
+class _Run(NamedTuple):
+    """Blocks of knots at equal distances in the band, d knots apart from their columns'."""
+
+    d: int
+    knots: slice
+    row: int
+    """Place of the first knot, and of the knot d ahead of it."""
+    column: int
+    step: int
+    """How many places further the next ones are, both alike."""
+
+
+def _runs(d: int, place: Indices, ahead: Indices) -> list[_Run]:
+    """Blocks ``d`` knots apart, by places of the knots and of those ahead."""
+    moves = list(zip(np.diff(place).tolist(), np.diff(ahead).tolist(), strict=True))
+    runs, first, n = [], 0, len(place)
+    while first < n:
+        last, step = first, 0
+        while last < n - 1 and moves[last][0] == moves[last][1] and step in (0, moves[last][0]):
+            step, last = moves[last][0], last + 1
+        runs.append(_Run(d, slice(first, last + 1), int(place[first]), int(ahead[first]), step))
+        first = last + 1
+    return runs
 
 
 class BorderedMatrix(NamedTuple):

@@ -118,11 +118,13 @@ class Transcription:
         sensor = np.empty((self.n_knots, self.walker.model.nsensordata))
 
         def work(knots: range, data: Any) -> None:
-            model = self.walker.model
+            model, inverse = self.walker.model, mujoco.mj_inverse
+            qpos, qvel, qacc = data.qpos, data.qvel, data.qacc  # views: each costs a lookup
+            forces, sensors = data.qfrc_inverse, data.sensordata
             for i in knots:
-                data.qpos[:], data.qvel[:], data.qacc[:] = q[i], v[i], a[i]
-                mujoco.mj_inverse(model, data)
-                force[i], sensor[i] = data.qfrc_inverse, data.sensordata
+                qpos[:], qvel[:], qacc[:] = q[i], v[i], a[i]
+                inverse(model, data)
+                force[i], sensor[i] = forces, sensors
 
         self._over_knots(work)
         return self._assemble(x, q, v, a, gait, force, sensor)

@@ -21,8 +21,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from walking_irl.arrays import Array, Flags, Indices
+from walking_irl.arrays import Array, Indices
 from walking_irl.domains.humanoid.optimiser.dynamics.cone import Cone, Softness
+from walking_irl.domains.humanoid.optimiser.dynamics.packed import Packed
 from walking_irl.domains.humanoid.optimiser.dynamics.rigid_body import RigidBody
 from walking_irl.domains.humanoid.optimiser.dynamics.spatial import (
     cross,
@@ -34,6 +35,9 @@ from walking_irl.domains.humanoid.optimiser.dynamics.spatial import (
     times,
 )
 from walking_irl.domains.humanoid.optimiser.dynamics.tree import Square, Tree
+
+_CENTRE = np.array([[1.0], [1.0], [2.0]])
+"""A contact point rises half as fast as the centre of its sphere."""
 
 
 class Soles:
@@ -80,33 +84,6 @@ class Soles:
         """Add blocks (N, feet, m, m) of the chains to matrices (N, nv, nv)."""
         for k, square in enumerate(self.squares):
             onto[square.block] += factor * blocks[:, k, : square.size, : square.size]
-
-
-class Packed(NamedTuple):
-    """Active contacts: their knot, foot and sphere; where the groups of a knot and foot start."""
-
-    knot: Indices
-    foot: Indices
-    sphere: Indices
-    starts: Indices
-    groups: Indices
-    shape: tuple[int, int]
-
-    @classmethod
-    def of(cls, active: Flags, foot: Indices, n_feet: int) -> Packed:
-        """Pack what is active, shape (N, n)."""
-        knot, sphere = np.nonzero(active)
-        group = knot * n_feet + foot[sphere]  # ascending: spheres are sorted by foot
-        starts = np.flatnonzero(np.diff(group, prepend=-1))
-        return cls(knot, foot[sphere], sphere, starts, group[starts], (len(active), n_feet))
-
-    def sum(self, x: Array) -> Array:
-        """Sums over the contacts of each knot and foot, shape (N, feet, ...)."""
-        n, feet = self.shape
-        out = np.zeros((n * feet, *x.shape[1:]))
-        if len(self.starts):
-            out[self.groups] = np.add.reduceat(x, self.starts, axis=0)
-        return out.reshape(n, feet, *x.shape[1:])
 
 
 class Contact:
@@ -172,10 +149,12 @@ class Contact:
         stiffness = -law.D[:, None, None] * self.cone.hessian
         shrink = (law.D1[:, None] * self.cone.gradient)[..., None] * d_q[:, None]
         force_q, force_a = stiffness @ self.s_q - shrink, stiffness @ self.J
-        m = soles.width
-        pulled = self.packed.sum(self.J.mT @ np.concatenate([force_q, force_a], -1))
-        wrench = self.packed.sum(times(self.rows.mT, force))
-        lever = self.packed.sum((skew(-force) @ self.p_q).mT)  # p_q x F
+        pack, m = self.packed, soles.width
+        self._padded_J, self._padded_p = pack.pad(self.J), pack.pad(self.p_q)
+        pulling = pack.pad(np.concatenate([force_q, force_a], -1))
+        pulled = pack.products(self._padded_J, pulling)
+        wrench = pack.sum(times(self.rows.mT, force))
+        lever = pack.products(self._padded_p, pack.pad(skew(force)))  # p_q x F
         rotated = (self.axes @ force_matrix(wrench).mT) @ self.axes.mT  # (S_j x* F).S_k
         self._by_a = pulled[..., m:]
         self._by_q = pulled[..., :m] + soles.upper.T * rotated + self.axes[..., :3] @ lever.mT
@@ -212,11 +191,14 @@ class Contact:
         h_u, h_j = hessian @ U, hessian[:, 3:6, 3:6] @ self.J
         pull = cross(of_w, w_foot[knot, foot, :3]) + cross(of_s, self.y_foot[knot, foot, :3])
         pull[:, 2] = 0.5 * pull[:, 2] + law.D1 * w_g + law.push1 * of_s[:, 2]
-        centre_q = self.p_q * np.array([1.0, 1.0, 2.0])[:, None]
-        levers = [(skew(-f) @ x).mT for f, x in ((pull, centre_q), (of_w, self.p_q))]
-        levers += [(skew(-of_s) @ self.p_q).mT]
-        products = [U.mT @ h_u, h_u[:, 3:6].mT @ self.J, self.J.mT @ h_j]
-        summed = self.packed.sum(np.concatenate([*products, *levers], -1))
+        levers = np.concatenate([_CENTRE * skew(pull), skew(of_w), skew(of_s)], -1)
+        pack = self.packed
+        summed = Summed(
+            uu=pack.products(pack.pad(U), pack.pad(h_u)),
+            uy=pack.products(pack.pad(h_u[:, 3:6]), self._padded_J),
+            yy=pack.products(self._padded_J, pack.pad(h_j)),
+            levers=pack.products(self._padded_p, pack.pad(levers)),
+        )
         wrenches = np.stack([times(self.rows.mT, of_w), times(self.rows.mT, of_s)], 1)
         return self._bent(summed, self.packed.sum(wrenches), w_turned)
 
@@ -233,19 +215,31 @@ class Contact:
         phi[:, 6, 6] = law.D2 * w_g + of_s[:, 2] * law.push2
         return phi
 
-    def _bent(self, summed: Array, wrench: Array, w_turned: Array) -> Bent:
+    def _bent(self, summed: Summed, wrench: Array, w_turned: Array) -> Bent:
         """Add the second derivatives of w, s and d themselves to the chained Hessian."""
-        soles, axes, m = self.soles, self.axes, self.soles.width
+        soles, axes = self.soles, self.axes
         by_w, by_s = (axes @ force_matrix(wrench[:, :, i]).mT for i in range(2))
         turned = np.concatenate([w_turned, self.turned], -1)
         nested = soles.half * -(np.concatenate([by_w, by_s], -1) @ turned.mT)
-        levers = summed[..., 3 * m + 3 :]
+        turn, levers = summed.levers[..., :3], summed.levers[..., 3:]
         spins = np.concatenate([w_turned[..., :3], self.turned[..., :3]], -1)
         mixed = spins @ levers.mT
-        qq = 0.5 * summed[..., :m] + nested + mixed
-        qy = summed[..., m : 2 * m] - soles.upper * (by_s @ axes.mT)
+        qq = 0.5 * summed.uu + nested + mixed
+        qy = summed.uy - soles.upper * (by_s @ axes.mT)
         qy += levers[..., 3:] @ axes[..., :3].mT
-        return Bent(qq, qy, summed[..., 2 * m : 3 * m], summed[..., 3 * m : 3 * m + 3])
+        return Bent(qq, qy, summed.yy, turn)
+
+
+class Summed(NamedTuple):
+    """Second derivatives of phi, chained, summed over contacts, and levers p_q x (...) of forces.
+
+    ``uu``, ``uy`` and ``yy`` have shape (N, feet, m, m), ``levers`` (N, feet, m, 9).
+    """
+
+    uu: Array
+    uy: Array
+    yy: Array
+    levers: Array
 
 
 class Bent(NamedTuple):

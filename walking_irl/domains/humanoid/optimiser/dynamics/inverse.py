@@ -22,6 +22,7 @@ from walking_irl.domains.humanoid.optimiser.dynamics.coverage import (
 )
 from walking_irl.domains.humanoid.optimiser.dynamics.rigid_body import RigidBody
 from walking_irl.domains.humanoid.optimiser.dynamics.sensors import Plan, Sensors, Whole
+from walking_irl.domains.humanoid.optimiser.dynamics.spatial import times
 from walking_irl.domains.humanoid.optimiser.dynamics.tree import Kinematics, Passive, Tree
 
 FD_STEP = 1e-7
@@ -43,18 +44,46 @@ class Derivatives:
     s_v: Array
     s_a: Array
 
-    def half_curvature(self, lam: Array, sigma: Array) -> Array | None:
+    def curvature(self, lam: Array, sigma: Array) -> Curvature | None:
         """Second derivatives of lambda.tau + sigma.s, or None where there is no closed form.
 
         Args:
             lam: Multipliers of all generalised forces, shape (N, nv).
             sigma: Multipliers of all sensors, shape (N, ns).
-
-        Returns:
-            Matrices X of shape (N, 3 nv, 3 nv) whose X + X' are the second derivatives with respect
-            to (q, v, a) of each knot.
         """
         return None
+
+
+class Curvature(NamedTuple):
+    """Second derivatives at N knots by q, v, a, and by y = a + damping v; (N, nv, nv) each.
+
+    ``qq``, ``vv`` and ``yy`` are symmetric; accelerations enter by y alone where they enter twice:
+    the second derivatives by v are ``vv`` + damping^2 ``yy``, by v and a damping ``yy``, by a
+    ``yy``.
+    """
+
+    qq: Array
+    qv: Array
+    qa: Array
+    vv: Array
+    yy: Array
+    damping: float
+
+    def times(self, v: Array, a: Array) -> Array:
+        """Product with a change of v and a, (N, nv) each; shape (3, N, nv)."""
+        by_y = times(self.yy, a + self.damping * v)
+        by_q = times(self.qv, v) + times(self.qa, a)
+        return np.stack([by_q, times(self.vv, v) + self.damping * by_y, by_y])
+
+    def matrix(self) -> Array:
+        """All of them, shape (N, 3 nv, 3 nv)."""
+        va = self.damping * self.yy
+        rows = [
+            [self.qq, self.qv, self.qa],
+            [self.qv.mT, self.vv + self.damping * va, va],
+            [self.qa.mT, va, self.yy],
+        ]
+        return np.block(rows)
 
 
 class InverseDynamics:
@@ -130,17 +159,14 @@ class ClosedForm(Derivatives):
             self.s_a[:, row, square.dofs] = normal_a
             self.s_v[:, row, square.dofs] = soles.soft.damping * normal_a
 
-    def half_curvature(self, lam: Array, sigma: Array) -> Array:
-        """Half the second derivatives; see :meth:`Derivatives.half_curvature`."""
+    def curvature(self, lam: Array, sigma: Array) -> Curvature:
+        """Second derivatives; see :meth:`Derivatives.curvature`."""
         tree, soles, plan = self.parts[:3]
         axes, n, nv, B = self.body.at.axes, len(lam), tree.nv, soles.soft.damping
         angular = self.sensors.angular(sigma)
         halves, W, omega = self.body.curvature(axes * lam[..., None], angular)
-        out = np.zeros((n, 3 * nv, 3 * nv))
-        q, v, a = (slice(k * nv, (k + 1) * nv) for k in range(3))
-        self.sensors.bend(
-            sigma, halves, Whole(out[:, q, q], out[:, q, v], out[:, q, a], out[:, v, v])
-        )
+        whole = Whole(*np.zeros((4, n, nv, nv)))
+        self.sensors.bend(sigma, halves, whole)
         normal = np.zeros((n, len(soles.bodies)))
         for row, foot in plan.touch:
             normal[:, foot] += sigma[:, row]
@@ -148,19 +174,23 @@ class ClosedForm(Derivatives):
         for k, square in enumerate(soles.squares):
             halves.turn[:, square.dofs] += bent.turn[:, k, : square.size]
         halves.qq[:] += axes[..., :3] @ halves.turn.mT
+        qq, qv, qa, vv = whole
         C, U = tree.half_carries, tree.strictly
-        out[:, q, q] += C * halves.qq
-        out[:, v, v] += C * halves.vv
-        out[:, q, v] += tree.carries * halves.qv + (U * halves.vq).mT
-        out[:, q, a] += tree.carries * halves.qa + (U * halves.aq).mT
+        qq += C * halves.qq
+        vv += C * halves.vv
+        qv += tree.carries * halves.qv
+        qv += (U * halves.vq).mT
+        qa += tree.carries * halves.qa
+        qa += (U * halves.aq).mT
+        yy = np.zeros((n, nv, nv))
+        for to, blocks, factor in ((qq, bent.qq, 1.0), (qv, bent.qy, B), (qa, bent.qy, 1.0)):
+            soles.spread(blocks, to, factor)
+        soles.spread(bent.yy, yy)
+        qq, vv = qq + qq.mT, vv + vv.mT
         i = np.arange(nv)
-        out[:, i, i] += 0.5 * lam * self._bends[0]
-        out[:, nv + i, nv + i] += 0.5 * lam * self._bends[1]
-        spread = [(q, q, bent.qq, 1.0), (q, v, bent.qy, B), (q, a, bent.qy, 1.0)]
-        spread += [(v, v, bent.yy, 0.5 * B * B), (v, a, bent.yy, B), (a, a, bent.yy, 0.5)]
-        for rows, columns, blocks, factor in spread:
-            soles.spread(blocks, out[:, rows, columns], factor)
-        return out
+        qq[:, i, i] += lam * self._bends[0]
+        vv[:, i, i] += lam * self._bends[1]
+        return Curvature(qq, qv, qa, vv, yy, B)
 
 
 class FiniteDifferences(Derivatives):

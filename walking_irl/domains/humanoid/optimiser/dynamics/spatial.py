@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from walking_irl.arrays import Array, Indices
+from walking_irl.arrays import Array
 
 
 def _skew_map() -> Array:
@@ -33,16 +33,17 @@ def _six_maps() -> tuple[Array, Array, Array]:
     return motion.reshape(6, 36), force.reshape(6, 36), inertia.reshape(10, 36)
 
 
-def _product_terms(parts: list[tuple[int, int, int]]) -> tuple[Indices, Indices, Array]:
-    """Indices of both factors, and signs, of sums of 3-vector products (out, a, b offsets)."""
+def _product_terms(parts: list[tuple[int, int, int]]) -> tuple[Array, Array, Array]:
+    """What picks the factors of 3-vector products (out, a, b offsets) and sums them with signs."""
     of_a, of_b, rows = [], [], []
+    eye = np.eye(6)
     for out, a, b in parts:
         for k in range(3):
             i, j = (k + 1) % 3, (k + 2) % 3
-            of_a += [a + i, a + j]
-            of_b += [b + j, b + i]
-            rows += [np.eye(6)[out + k], -np.eye(6)[out + k]]
-    return np.array(of_a), np.array(of_b), np.array(rows)
+            of_a += [eye[a + i], eye[a + j]]
+            of_b += [eye[b + j], eye[b + i]]
+            rows += [eye[out + k], -eye[out + k]]
+    return np.array(of_a).T, np.array(of_b).T, np.array(rows)
 
 
 _SKEW = _skew_map().reshape(3, 9)
@@ -63,14 +64,23 @@ def skew(a: Array) -> Array:
 
 def motion_cross(a: Array, b: Array) -> Array:
     """Motion times motion, a x b."""
-    of_a, of_b, signs = _BY_MOTION
-    return np.asarray((a.take(of_a, -1) * b.take(of_b, -1)) @ signs)
+    return _products(_BY_MOTION, a, b)
 
 
 def force_cross(a: Array, f: Array) -> Array:
     """Motion times force, a x* f."""
-    of_a, of_f, signs = _BY_FORCE
-    return np.asarray((a.take(of_a, -1) * f.take(of_f, -1)) @ signs)
+    return _products(_BY_FORCE, a, f)
+
+
+def _products(terms: tuple[Array, Array, Array], a: Array, b: Array) -> Array:
+    """Sums of products of components; two-dimensional matrix products are fastest."""
+    of_a, of_b, signs = terms
+    left, right = a.reshape(-1, 6) @ of_a, b.reshape(-1, 6) @ of_b
+    if a.shape == b.shape:
+        left *= right
+        return np.asarray(left @ signs).reshape(b.shape)
+    both = left.reshape(*a.shape[:-1], -1) * right.reshape(*b.shape[:-1], -1)
+    return np.asarray(both @ signs)
 
 
 def motion_matrix(a: Array) -> Array:
