@@ -16,22 +16,25 @@ from walking_irl.baselines.cpirl_actions import cpirl_actions
 from walking_irl.baselines.girl import girl
 from walking_irl.baselines.given import Given, signed, solver
 from walking_irl.baselines.gpirl import gpirl
+from walking_irl.baselines.inverse_optimal_control import bilevel_gauss_newton, bilevel_search
 from walking_irl.baselines.loop import Baseline, Setting
 from walking_irl.baselines.maxent import maxent
 from walking_irl.baselines.mce import mce_likelihood, mce_matching
 from walking_irl.baselines.mmp import mmp
 from walking_irl.baselines.mmp_boost import mmp_boost
 from walking_irl.baselines.ng_russell_1 import ng_russell_1
-from walking_irl.baselines.ng_russell_2 import ng_russell_2
+from walking_irl.baselines.ng_russell_2 import ng_russell_2, ng_russell_2_sampled
 from walking_irl.baselines.ng_russell_3 import ng_russell_3
 from walking_irl.baselines.policy_matching import policy_matching
 from walking_irl.baselines.policywalk import policywalk
-from walking_irl.baselines.recovered import Recovered, from_weights
+from walking_irl.baselines.recovered import Recovered, from_weights, positive
 from walking_irl.baselines.relative_entropy import relative_entropy
 from walking_irl.cpirl import cpirl
 from walking_irl.types import Expert
 
 Rng = np.random.Generator
+DEVIATION = 0.01
+"""Relative size of sampled deviations from the expert's policy."""
 
 
 def run_ng_russell_1(given: Given, rng: Rng, **options: Any) -> Recovered:
@@ -40,7 +43,12 @@ def run_ng_russell_1(given: Given, rng: Rng, **options: Any) -> Recovered:
 
 
 def run_ng_russell_2(given: Given, rng: Rng, **options: Any) -> Recovered:
-    """Complete policy, linear reward."""
+    """Complete policy, linear reward; sampled deviations outside of finite worlds."""
+    if not given.is_finite:
+        size = options.pop("size", DEVIATION)
+        positive(size=size)
+        advantages = given.offered("advantages")(given.shown, size=size, rng=rng)
+        return ng_russell_2_sampled(advantages, **options)
     return ng_russell_2(given.mdp, given.policy, rng=rng, **options)
 
 
@@ -60,8 +68,20 @@ def run_mmp_boost(given: Given, rng: Rng, **options: Any) -> Recovered:
 
 
 def run_policy_matching(given: Given, rng: Rng, **options: Any) -> Recovered:
-    """Neu & Szepesvari."""
+    """Neu & Szepesvari; outside of finite worlds policies are compared by their parameters."""
+    if not given.is_finite:
+        return _bilevel(bilevel_gauss_newton, given, **options)
     return policy_matching(given.mdp, given.demonstrations, **options)
+
+
+def run_bilevel_search(given: Given, rng: Rng, **options: Any) -> Recovered:
+    """Mombaur's bilevel method, without derivatives."""
+    return _bilevel(bilevel_search, given, **options)
+
+
+def _bilevel(method: Callable[..., Recovered], given: Given, **options: Any) -> Recovered:
+    solve = given.offered("nearest")(given.shown)
+    return method(solve, len(given.exact.mu), **{"min_weight": given.least, **options})
 
 
 def run_girl(given: Given, rng: Rng, **options: Any) -> Recovered:
@@ -83,7 +103,9 @@ def run_mce_matching(given: Given, rng: Rng, **options: Any) -> Recovered:
 
 
 def run_maxent(given: Given, rng: Rng, **options: Any) -> Recovered:
-    """MaxEnt 2008."""
+    """MaxEnt 2008; over an archive of policies, which stand for paths, elsewhere."""
+    if not given.is_finite:
+        return _over_archive(archive_maxent, given, rng, options)
     return maxent(given.mdp, given.demonstrations, **options)
 
 
@@ -117,6 +139,7 @@ def run_cpirl(
             centre=centre,
             mode=mode,  # type: ignore[arg-type]  # checked by cpirl
             max_solves=max_solves,
+            min_weight=0.0 if given.is_finite else given.least,
             rng=rng,
         )
     )
@@ -196,7 +219,7 @@ def _apprenticeship(
     """A mixture of policies: signed weights in finite worlds, the simplex elsewhere."""
     is_signed = given.is_finite and method is not BASELINES["kelley"]
     run = method(
-        given.forward,
+        given.oracle,
         given.exact,
         rng=rng,
         setting=Setting(is_signed=is_signed),
@@ -212,9 +235,9 @@ def _game(name: str, given: Given, rng: Rng, **options: Any) -> Recovered:
         if name == "lpal":
             given.mdp  # noqa: B018  # says why not
         corners = np.eye(len(given.exact.mu))
-        span = max(float(np.abs(given.forward(w).mu - given.exact.mu).max()) for w in corners)
+        span = max(float(np.abs(given.oracle(w).mu - given.exact.mu).max()) for w in corners)
         setting = Setting(False, span)
-        run = BASELINES[name](given.forward, given.exact, rng=rng, setting=setting, **options)
+        run = BASELINES[name](given.oracle, given.exact, rng=rng, setting=setting, **options)
         return _mixed(given, list(run), False)
     mdp = signed(given.planned)
     expert = Expert(np.r_[given.exact.mu, -given.exact.mu], np.zeros(2 * len(given.exact.mu)))

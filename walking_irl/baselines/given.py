@@ -24,6 +24,12 @@ from walking_irl.rl.finite_mdp import Actions, FiniteMDP
 from walking_irl.rl.tabular import best_policy, checked_policy
 from walking_irl.types import Expert, Forward, Response
 
+HOOKS = {
+    "policy_gradient": "policies with parameters and the gradient of their features",
+    "advantages": "deviations from a policy whose features can be told",
+    "nearest": "policies with parameters that can be compared",
+}
+"""What a world may offer beside its solver, in words; see :mod:`walking_irl.domains.contract`."""
 ARCHIVE_SOLVES = 60
 """Forward solves of the CPIRL run whose policies are an archive, where none is given."""
 
@@ -157,17 +163,51 @@ class Given:
         Raises:
             InvalidInputError: If the world or the expert does not offer it.
         """
-        hook: Callable[[Any], Array] | None = getattr(self.world, "policy_gradient", None)
-        if hook is None:
-            raise InvalidInputError(
-                f"{self.method} needs policies with parameters and the gradient of their features, "
-                f"{self.name} offers no policy_gradient"
-            )
+        G: Array = self.offered("policy_gradient")(self.shown)
+        return G
+
+    @property
+    def shown(self) -> Any:
+        """The expert's policy, as the world has policies.
+
+        Raises:
+            InvalidInputError: If only features are known.
+        """
         if not isinstance(self.data, Expert) or self.data.demonstration is None:
             raise InvalidInputError(
                 f"{self.method} needs the expert's policy: give an Expert with its demonstration"
             )
-        return hook(self.data.demonstration)
+        return self.data.demonstration
+
+    @property
+    def least(self) -> float:
+        """The world's lower bound of every weight."""
+        return float(getattr(getattr(self.world, "defaults", None), "min_weight", 0.0))
+
+    @property
+    def oracle(self) -> Forward:
+        """The solver, moved off the faces of the simplex where a world asks for that.
+
+        For methods whose queries are corners: where a weight vanishes the optimum may not exist.
+        """
+        forward = self.forward
+        share = float(getattr(getattr(self.world, "defaults", None), "interior", 0.0))
+        if self.is_finite or share == 0.0:
+            return forward
+        return lambda w: forward((1 - share) * w + share / len(w))
+
+    def offered(self, hook: str) -> Callable[..., Any]:
+        """What a world may offer beside its solver, by name.
+
+        Raises:
+            InvalidInputError: If this one does not.
+        """
+        found: Callable[..., Any] | None = getattr(self.world, hook, None)
+        if found is None:
+            raise InvalidInputError(
+                f"{self.method} needs {HOOKS[hook]}, {self.name} offers no {hook}"
+            )
+        return found
 
     def archive(
         self, rng: np.random.Generator, max_solves: int = ARCHIVE_SOLVES
@@ -183,7 +223,14 @@ class Given:
             n_solves += 1
             return replace(forward(w), sensitivity=None)
 
-        run = cpirl(cuts_only, self.exact, mode="minimise", max_solves=max_solves, rng=rng)
+        run = cpirl(
+            cuts_only,
+            self.exact,
+            mode="minimise",
+            max_solves=max_solves,
+            min_weight=self.least,
+            rng=rng,
+        )
         rows = []
         for it in run:
             rows += [it.response.mu[None], it.response.evaluated.reshape(-1, it.w.size)]

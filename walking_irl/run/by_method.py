@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from walking_irl.arrays import Array
+from walking_irl.baselines.given import HOOKS
 from walking_irl.baselines.recovered import Recovered
 from walking_irl.baselines.registry import FINITE, METHODS, Method, Needs, run_method
 from walking_irl.domains import load
@@ -164,9 +165,10 @@ def _check(
             f"{method.name} needs finitely many states and actions with a known model, "
             f"{domain.name} has not"
         )
-    if method.needs is Needs.GRADIENT and not hasattr(domain, "policy_gradient"):
+    is_asked = mdp is None or FINITE not in method.worlds
+    if method.hook and is_asked and not hasattr(domain, method.hook):
         raise InvalidInputError(
-            f"{method.name} needs the gradient of policies with parameters, {domain.name} has none"
+            f"{method.name} needs {HOOKS[method.hook]}; {domain.name} offers none"
         )
     if n_trajectories is None:
         return mdp
@@ -186,7 +188,7 @@ def _world(problem: Problem) -> Any:
     domain = problem.domain
     if isinstance(getattr(domain, "mdp", None), FiniteMDP):
         return domain
-    offered = {"name": domain.name, "forward": problem.learner.forward}
-    if hasattr(domain, "policy_gradient"):
-        offered["policy_gradient"] = domain.policy_gradient
-    return SimpleNamespace(**offered)
+    hooks = {hook: getattr(domain, hook) for hook in HOOKS if hasattr(domain, hook)}
+    return SimpleNamespace(
+        name=domain.name, forward=problem.learner.forward, defaults=domain.defaults, **hooks
+    )

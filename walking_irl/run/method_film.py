@@ -91,7 +91,7 @@ def _entries(report: MethodReport, world: World) -> Callable[[int], Any] | None:
 
 
 def _is_lottery(report: MethodReport) -> bool:
-    return isinstance(report.found.policy, tuple)
+    return "mixture" in report.found.info and isinstance(report.found.policy, tuple)
 
 
 def _seen(report: MethodReport, reward: Array | None) -> Array | None:
