@@ -146,10 +146,9 @@ def _by_globals(at: Weighted, pairs: Pairs, numbers: Array) -> _Global:
 
 def _multipliers(at: Weighted, root: Array | None) -> tuple[Multipliers, Array]:
     """Multipliers of all outputs, and of v_next (N, nv)."""
-    y = at.factors.times(at.residuals)
-    channels = at.lin.partials.transpose_times(y.costs)
-    of_root = y.root if root is None else root
-    folded = at.lin.chain.fold(Outputs(channels, of_root, float(y.anchors[1])))
+    f, r, channels = at.factors, at.residuals, at.by_channels
+    of_root = f.root * r.root if root is None else root
+    folded = at.lin.chain.fold(Outputs(channels, of_root, float(f.anchors[1] * r.anchors[1])))
     return folded, channels.v_next
 
 
