@@ -12,7 +12,6 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import minimize
 
 from walking_irl.arrays import Array, Indices
 from walking_irl.domains.contract import Compared
@@ -175,6 +174,8 @@ class LQR(ExactDomain):
         Raises:
             SolverError: If it does not converge.
         """
+        from scipy.optimize import minimize  # takes .3 s; other domains come by here, too
+
         K = self.n_objectives
 
         def regret(w: Array) -> tuple[float, Array]:
