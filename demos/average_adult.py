@@ -21,7 +21,6 @@ from walking_irl.domains.humanoid.recorded.person import Options
 from walking_irl.domains.humanoid.recorded.reader import read_person
 from walking_irl.domains.humanoid.spec import HUMANOID
 from walking_irl.files import write_file, write_json
-from walking_irl.run.joint import Walk
 from walking_irl.run.walk import explain, nearest, starting_weights
 from walking_irl.run.walk_report import explanation_json
 from walking_irl.workers import workers
@@ -44,7 +43,7 @@ def main() -> None:
         person = read_person([path], HUMANOID.walker, Options(cycle_time=cycle_time()))
     print(f"{person.speed:.2f} m/s, {person.cadence:.0f} steps a minute; not recorded: "
           f"{', '.join(person.missing)}")  # fmt: skip
-    walk = Walk(person.gait, person.missing)
+    walk = person.walk
     reference = HUMANOID.stack.reference_weights
     with workers() as executor:
         near = nearest(HUMANOID, walk, executor)

@@ -19,8 +19,8 @@ from walking_irl.domains.humanoid.gait.pictures import SIDE, photograph
 from walking_irl.files import write_file, write_png
 from walking_irl.recording import Clock
 from walking_irl.recording.blueprint import motion_blueprint
+from walking_irl.recording.stream import FLUSH_SECONDS, open_stream
 from walking_irl.recording.views.registry import world_of
-from walking_irl.recording.writer import FLUSH_SECONDS, open_stream
 from walking_irl.workers import workers
 
 POSTURES = 6

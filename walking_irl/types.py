@@ -101,6 +101,7 @@ class Status(enum.Enum):
     )
     STALLED = "the query repeats itself and the solver finds nothing better"
     BUDGET = "the budget of forward solves is spent"
+    SAMPLED = "as many samples are drawn as were asked for"
 
     @property
     def is_success(self) -> bool:

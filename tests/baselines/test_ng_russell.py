@@ -11,7 +11,7 @@ from walking_irl.domains.lqr import LQR
 from walking_irl.domains.mdp.gridworld import Gridworld
 from walking_irl.errors import InvalidInputError
 from walking_irl.rl.finite_mdp import FiniteMDP
-from walking_irl.rl.tabular import best_policy, loss
+from walking_irl.rl.tabular import best_policy, loss, policy_value
 from walking_irl.types import Response, Status
 
 
@@ -39,7 +39,7 @@ def dense_program(mdp: FiniteMDP, pi: np.ndarray, l1: float) -> float:
 
 
 def advantages(mdp, pi, reward):
-    V = mdp.system(pi).solve(reward)
+    V = policy_value(mdp, pi, reward)
     Q = mdp.action_values(reward, V)
     return V - Q
 

@@ -15,7 +15,7 @@ def test_methods_are_listed_with_where_they_run(capsys):
 def test_another_method_prints_its_table_and_writes_its_figures(capsys, tmp_path):
     path = tmp_path / "out.json"
     arguments = ["recover", "--method", "mce-likelihood", "--domain", "random-mdp"]
-    assert main([*arguments, "--trajectories", "20", "--json", str(path)]) == 0
+    assert main([*arguments, "--trajectories", "20", "--no-record", "--json", str(path)]) == 0
     out = capsys.readouterr().out
     content = json.loads(path.read_text())
     assert content["method"] == "mce-likelihood"
@@ -38,3 +38,75 @@ def test_what_cannot_run_is_one_sentence(arguments, message, capsys):
     assert main(["recover", *arguments]) == 2
     err = capsys.readouterr().err
     assert message in err and err.count("\n") == 1
+
+
+GIRL = ["recover", "--method", "girl", "--domain", "lqr"]
+
+
+def test_the_recording_is_called_as_domain_and_method_and_an_earlier_one_is_kept(
+    capsys, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    assert main([*GIRL, "--json", "a.json"]) == 0
+    assert "recording lqr-girl.rrd: walking-irl view lqr-girl.rrd" in capsys.readouterr().out
+    assert json.loads((tmp_path / "a.json").read_text())["recording"] == "lqr-girl.rrd"
+    first = (tmp_path / "lqr-girl.rrd").read_bytes()
+    assert main([*GIRL, "--seed", "1"]) == 0
+    assert "an earlier run is kept: lqr-girl.1.rrd" in capsys.readouterr().out
+    assert (tmp_path / "lqr-girl.1.rrd").read_bytes() == first
+    assert main(["inspect", "lqr-girl.rrd"]) == 0
+    out = capsys.readouterr().out
+    assert "method: girl" in out and "ground truth" in out and "axis 3" in out
+
+
+def test_no_record_writes_none_and_record_names_the_file(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main([*GIRL, "--no-record"]) == 0
+    assert not list(tmp_path.iterdir())
+    for _ in range(2):  # a file that a user names is written over, as for other recoveries
+        assert main([*GIRL, "--record", "mine.rrd"]) == 0
+    assert [p.name for p in tmp_path.iterdir()] == ["mine.rrd"]
+
+
+@pytest.mark.parametrize(
+    ("path", "message"),
+    [("mine.mp4", "expected a file name in .rrd"), ("none/mine.rrd", "none"), ("mine.json", "rrd")],
+)
+def test_a_recording_that_cannot_be_written_is_said_before_the_method_runs(
+    path, message, capsys, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("walking_irl.run.by_method.recover_by", lambda *a, **b: pytest.fail("ran"))
+    assert main([*GIRL, "--record", path]) == 2
+    err = capsys.readouterr().err
+    assert message in err and err.count("\n") == 1
+
+
+def test_ctrl_c_while_it_is_recorded_keeps_the_result(capsys, tmp_path, monkeypatch):
+    from walking_irl.recording.method_view import MethodView
+
+    def interrupt(*args):
+        raise KeyboardInterrupt
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(MethodView, "log_answer", interrupt)
+    assert main([*GIRL, "--json", "a.json"]) == 130
+    assert "recovered" in capsys.readouterr().out
+    assert json.loads((tmp_path / "a.json").read_text())["weights"]
+    assert main(["inspect", "lqr-girl.rrd"]) == 0
+    assert "ending: interrupted" in capsys.readouterr().out
+
+
+def test_a_recording_that_fails_at_the_end_keeps_the_result(capsys, tmp_path, monkeypatch):
+    from walking_irl.errors import RecordingError
+    from walking_irl.recording import stream
+
+    def full(*args):
+        raise RecordingError("cannot write it: no space left")
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(stream, "write_file", full)
+    assert main(GIRL) == 2
+    out, err = capsys.readouterr()
+    assert "recovered" in out and "no space left" in err
+    assert not list(tmp_path.iterdir())

@@ -11,6 +11,7 @@ import pytest
 
 from walking_irl.errors import InvalidInputError
 from walking_irl.experiments import cluster, lqr
+from walking_irl.experiments.cluster import ClusterError
 from walking_irl.experiments.study import Study, run_study
 from walking_irl.experiments.table import Table
 from walking_irl.run.setup import Setup
@@ -90,6 +91,23 @@ def test_a_scheduler_that_is_killed_is_one_sentence_and_keeps_what_is_done(dask,
     err = process.stderr.read()
     assert err.count("\n") == 1 and "was lost; finished jobs are kept" in err, err
     assert len(list((tmp_path / "study" / "cells").iterdir())) >= 2
+
+
+@pytest.mark.slow
+def test_a_job_that_kills_its_workers_is_one_sentence(monkeypatch):
+    monkeypatch.setenv("DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES", "0")  # 3 by default
+    scheduler, address = start("scheduler", "--host", "127.0.0.1", "--port", "0")
+    worker, _ = start("worker", address, "--nthreads", "1", "--no-nanny")
+    try:
+        with (
+            pytest.raises(ClusterError, match="a job killed every worker that took it"),
+            cluster.cluster(address) as pool,
+        ):
+            pool.submit(os._exit, 1).result()
+    finally:
+        for process in (worker, scheduler):
+            process.kill()
+            process.communicate()
 
 
 @pytest.mark.slow

@@ -229,3 +229,27 @@ def test_a_broken_cell_is_run_again(tmp_path):
     cell.write_text(cell.read_text()[:20])
     [again] = Runner(cache=tmp_path).outcomes("x", [task])
     assert untimed([again]) == untimed([first])
+
+
+def test_the_longest_jobs_begin_first():
+    """Whoever says nothing of its cost keeps its place behind them."""
+
+    class Job:
+        def __init__(self, name, cost=None):
+            self.name = name
+            if cost is not None:
+                self.cost = cost
+
+        def key(self):
+            return {"name": self.name}
+
+        def run(self):
+            begun.append(self.name)
+            return {"name": self.name}
+
+    begun = []
+    jobs = [Job("a"), Job("b", 1.0), Job("c", 9.0), Job("d")]
+    with ThreadPoolExecutor(1) as executor:
+        outcomes = Runner(executor=executor).outcomes("any", jobs)
+    assert begun == ["c", "b", "a", "d"]
+    assert [o["name"] for o in outcomes] == ["a", "b", "c", "d"]

@@ -121,7 +121,7 @@ def test_unreadable_files_are_refused_in_one_sentence(tmp_path: Path, recorded: 
         (text, "is not a Rerun recording"),
         (empty, "is not a Rerun recording"),
         (tmp_path / "none.rrd", "there is no recording"),
-        (tmp_path, "a folder or a device"),
+        (tmp_path, "a folder, a pipe or a device"),
     ):
         with pytest.raises(RecordingError, match=message) as caught:
             inspect_recording(path)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from walking_irl.arrays import Array
 from walking_irl.baselines import BASELINES
 from walking_irl.baselines.apprentice import Apprentice
 from walking_irl.baselines.archive import archive_maxent, archive_posterior
@@ -15,22 +16,25 @@ from walking_irl.baselines.cpirl_actions import cpirl_actions
 from walking_irl.baselines.girl import girl
 from walking_irl.baselines.given import Given, signed, solver
 from walking_irl.baselines.gpirl import gpirl
+from walking_irl.baselines.inverse_optimal_control import bilevel_gauss_newton, bilevel_search
 from walking_irl.baselines.loop import Baseline, Setting
 from walking_irl.baselines.maxent import maxent
 from walking_irl.baselines.mce import mce_likelihood, mce_matching
 from walking_irl.baselines.mmp import mmp
 from walking_irl.baselines.mmp_boost import mmp_boost
 from walking_irl.baselines.ng_russell_1 import ng_russell_1
-from walking_irl.baselines.ng_russell_2 import ng_russell_2
+from walking_irl.baselines.ng_russell_2 import ng_russell_2, ng_russell_2_sampled
 from walking_irl.baselines.ng_russell_3 import ng_russell_3
 from walking_irl.baselines.policy_matching import policy_matching
 from walking_irl.baselines.policywalk import policywalk
-from walking_irl.baselines.recovered import Recovered, from_weights
+from walking_irl.baselines.recovered import Recovered, from_weights, positive
 from walking_irl.baselines.relative_entropy import relative_entropy
 from walking_irl.cpirl import cpirl
 from walking_irl.types import Expert
 
 Rng = np.random.Generator
+DEVIATION = 0.01
+"""Relative size of sampled deviations from the expert's policy."""
 
 
 def run_ng_russell_1(given: Given, rng: Rng, **options: Any) -> Recovered:
@@ -39,7 +43,12 @@ def run_ng_russell_1(given: Given, rng: Rng, **options: Any) -> Recovered:
 
 
 def run_ng_russell_2(given: Given, rng: Rng, **options: Any) -> Recovered:
-    """Complete policy, linear reward."""
+    """Complete policy, linear reward; sampled deviations outside of finite worlds."""
+    if not given.is_finite:
+        size = options.pop("size", DEVIATION)
+        positive(size=size)
+        advantages = given.offered("advantages")(given.shown, size=size, rng=rng)
+        return ng_russell_2_sampled(advantages, **options)
     return ng_russell_2(given.mdp, given.policy, rng=rng, **options)
 
 
@@ -59,8 +68,20 @@ def run_mmp_boost(given: Given, rng: Rng, **options: Any) -> Recovered:
 
 
 def run_policy_matching(given: Given, rng: Rng, **options: Any) -> Recovered:
-    """Neu & Szepesvari."""
+    """Neu & Szepesvari; outside of finite worlds policies are compared by their parameters."""
+    if not given.is_finite:
+        return _bilevel(bilevel_gauss_newton, given, **options)
     return policy_matching(given.mdp, given.demonstrations, **options)
+
+
+def run_bilevel_search(given: Given, rng: Rng, **options: Any) -> Recovered:
+    """Mombaur's bilevel method, without derivatives."""
+    return _bilevel(bilevel_search, given, **options)
+
+
+def _bilevel(method: Callable[..., Recovered], given: Given, **options: Any) -> Recovered:
+    solve = given.offered("nearest")(given.shown)
+    return method(solve, len(given.exact.mu), **{"min_weight": given.least, **options})
 
 
 def run_girl(given: Given, rng: Rng, **options: Any) -> Recovered:
@@ -76,28 +97,29 @@ def run_mce_likelihood(given: Given, rng: Rng, **options: Any) -> Recovered:
 def run_mce_matching(given: Given, rng: Rng, **options: Any) -> Recovered:
     """MCE by features; over an archive of policies outside of finite worlds."""
     if not given.is_finite:
-        return archive_maxent(_archive(given, rng, options), given.exact.mu, **options)
+        return _over_archive(archive_maxent, given, rng, options)
     found = mce_matching(given.planned, given.exact, **options)
     return replace(found, mu=given.mdp.feature_expectations(found.policy))
 
 
 def run_maxent(given: Given, rng: Rng, **options: Any) -> Recovered:
-    """MaxEnt 2008."""
+    """MaxEnt 2008; over an archive of policies, which stand for paths, elsewhere."""
+    if not given.is_finite:
+        return _over_archive(archive_maxent, given, rng, options)
     return maxent(given.mdp, given.demonstrations, **options)
 
 
 def run_relative_entropy(given: Given, rng: Rng, **options: Any) -> Recovered:
     """Relative entropy; the archive stands for samples outside of finite worlds."""
     if not given.is_finite:
-        return archive_maxent(_archive(given, rng, options), given.exact.mu, **options)
+        return _over_archive(archive_maxent, given, rng, options)
     return relative_entropy(given.mdp, given.demonstrations, rng=rng, **options)
 
 
 def run_policywalk(given: Given, rng: Rng, **options: Any) -> Recovered:
     """PolicyWalk; over an archive of policies outside of finite worlds."""
     if not given.is_finite:
-        M = _archive(given, rng, options)
-        return archive_posterior(M, given.exact.mu, rng=rng, **options)
+        return _over_archive(partial(archive_posterior, rng=rng), given, rng, options)
     return policywalk(given.mdp, given.demonstrations, rng=rng, **options)
 
 
@@ -110,14 +132,22 @@ def run_cpirl(
     given: Given, rng: Rng, *, mode: str = "minimise", centre: str = "ac", max_solves: int = 40
 ) -> Recovered:
     """CPIRL from features with their error bars."""
-    *_, last = cpirl(
-        given.forward,
-        given.expert,
-        centre=centre,
-        mode=mode,  # type: ignore[arg-type]  # checked by cpirl
-        max_solves=max_solves,
-        rng=rng,
+    run = list(
+        cpirl(
+            given.forward,
+            given.expert,
+            centre=centre,
+            mode=mode,  # type: ignore[arg-type]  # checked by cpirl
+            max_solves=max_solves,
+            min_weight=0.0 if given.is_finite else given.least,
+            rng=rng,
+        )
     )
+    last = run[-1]
+    log: dict[str, Any] = {
+        "objective": np.array([it.best_regret for it in run]),
+        "iterates": np.array([it.estimate for it in run]),
+    }
     info = {
         "solves": last.k + 1,
         "intervals": last.intervals,
@@ -125,7 +155,9 @@ def run_cpirl(
         "regret": last.best_regret,
     }
     if given.is_finite:
-        return from_weights(given.mdp, last.estimate, "simplex", status=last.status, info=info)
+        return from_weights(
+            given.mdp, last.estimate, "simplex", status=last.status, info=info, **log
+        )
     answer = given.forward(last.estimate)
     return Recovered(
         w=last.estimate,
@@ -134,6 +166,7 @@ def run_cpirl(
         mu=answer.mu,
         status=last.status,
         info=info,
+        **log,
     )
 
 
@@ -167,10 +200,17 @@ def run_lpal(given: Given, rng: Rng, **options: Any) -> Recovered:
     return _game("lpal", given, rng, **options)
 
 
-def _archive(given: Given, rng: Rng, options: dict[str, Any]) -> Array:
-    """Policies to compare the expert with: the option ``archive`` (n, K), or a run of CPIRL's."""
+def _over_archive(
+    method: Callable[..., Recovered], given: Given, rng: Rng, options: dict[str, Any]
+) -> Recovered:
+    """Compare the expert with policies: the option ``archive`` (n, K), or those of a CPIRL run."""
     known = options.pop("archive", None)
-    return given.archive(rng) if known is None else np.asarray(known, dtype=np.float64)
+    if known is not None:
+        return method(known, given.exact.mu, **options)
+    M, n_solves = given.archive(rng)
+    found = method(M, given.exact.mu, **options)
+    note = f"it compares the expert with {len(M)} policies that CPIRL evaluated by cuts alone"
+    return replace(found, info={**found.info, "solves": n_solves}, notes=(note, *found.notes))
 
 
 def _apprenticeship(
@@ -178,15 +218,15 @@ def _apprenticeship(
 ) -> Recovered:
     """A mixture of policies: signed weights in finite worlds, the simplex elsewhere."""
     is_signed = given.is_finite and method is not BASELINES["kelley"]
-    *_, last = method(
-        given.forward,
+    run = method(
+        given.oracle,
         given.exact,
         rng=rng,
         setting=Setting(is_signed=is_signed),
         tol=tol,
         max_solves=max_solves,
     )
-    return _mixed(given, last, is_signed)
+    return _mixed(given, list(run), is_signed)
 
 
 def _game(name: str, given: Given, rng: Rng, **options: Any) -> Recovered:
@@ -195,34 +235,42 @@ def _game(name: str, given: Given, rng: Rng, **options: Any) -> Recovered:
         if name == "lpal":
             given.mdp  # noqa: B018  # says why not
         corners = np.eye(len(given.exact.mu))
-        span = max(float(np.abs(given.forward(w).mu - given.exact.mu).max()) for w in corners)
+        span = max(float(np.abs(given.oracle(w).mu - given.exact.mu).max()) for w in corners)
         setting = Setting(False, span)
-        *_, last = BASELINES[name](given.forward, given.exact, rng=rng, setting=setting, **options)
-        return _mixed(given, last, False)
+        run = BASELINES[name](given.oracle, given.exact, rng=rng, setting=setting, **options)
+        return _mixed(given, list(run), False)
     mdp = signed(given.planned)
     expert = Expert(np.r_[given.exact.mu, -given.exact.mu], np.zeros(2 * len(given.exact.mu)))
     span = 2 * float(np.abs(mdp.Phi).max()) / (1 - mdp.discount)
-    *_, last = BASELINES[name](
+    run = BASELINES[name](
         solver(mdp), expert, rng=rng, setting=Setting(False, span, mdp), **options
     )
-    return _mixed(given, last, True)
+    return _mixed(given, list(run), True)
 
 
-def _mixed(given: Given, last: Apprentice, is_signed: bool) -> Recovered:
-    """The mixture as one stationary policy where there are states, else as it is."""
+def _mixed(given: Given, run: list[Apprentice], is_signed: bool) -> Recovered:
+    """The mixture as one stationary policy where there are states, else as it is.
+
+    The log is the distance of the mixture's features to the expert's after each solve.
+    """
+    last, K = run[-1], len(given.exact.mu)
     info = {"solves": len(last.W), "mixture": last.mixture}
+    log: dict[str, Any] = {
+        "objective": np.array([np.linalg.norm((a.mu - a.mu_E)[:K]) for a in run]),
+        "iterates": last.W if last.W.shape[1] == K else last.W[:, :K] - last.W[:, K:],
+    }
     if given.is_finite:
         policy, _ = given.planned.stationary_policy(
             [r.policy for r in last.responses], last.mixture
         )
         mu = given.mdp.feature_expectations(policy)
-        return Recovered(policy=policy, mu=mu, status=last.status, info=info)
-    K = len(last.mu_E)
+        return Recovered(policy=policy, mu=mu, status=last.status, info=info, **log)
     return Recovered(
-        w=last.W[-1][:K],
+        w=last.W[-1],
         space="box" if is_signed else "simplex",
         policy=tuple(r.policy for r in last.responses),
         mu=last.mu,
         status=last.status,
         info=info,
+        **log,
     )

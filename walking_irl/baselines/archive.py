@@ -14,7 +14,7 @@ from scipy.optimize import minimize
 from scipy.special import logsumexp
 
 from walking_irl.arrays import Array
-from walking_irl.baselines.policywalk import effective_sample_sizes
+from walking_irl.baselines.policywalk import effective_sample_sizes, mixing
 from walking_irl.baselines.recovered import Recovered, positive
 from walking_irl.errors import InvalidInputError, SolverError
 from walking_irl.types import Status
@@ -85,8 +85,10 @@ def archive_posterior(
         space="simplex",
         samples=samples,
         objective=log,
-        status=Status.BUDGET,
+        iterates=samples,
+        status=Status.SAMPLED,
         info=info,
+        notes=mixing(samples),
     )
 
 

@@ -95,10 +95,10 @@ class Estimate(NamedTuple):
 def estimate(mdp: FiniteMDP, w: Array, counts: Array) -> Estimate:
     """g(w) with the completion and the optimal policy that it compares."""
     completed = complete(mdp, w, counts)
-    pi = best_policy(mdp, mdp.reward(w)).pi
-    mu = mdp.Phi.T @ Chain(mdp, pi).solve_transposed(mdp.start)
+    best = best_policy(mdp, mdp.reward(w))
+    mu = mdp.Phi.T @ best.chain.solve_transposed(mdp.start)
     g = max(0.0, float(w @ (mu - completed.mu)))
-    return Estimate(w, g, completed, Response(pi, mu))
+    return Estimate(w, g, completed, Response(best.pi, mu))
 
 
 def cpirl_actions(
@@ -138,7 +138,7 @@ def cpirl_actions(
     world = replace(mdp, start=visits / visits.sum())
     starts = _starts(world, demonstrations) if w is None else [np.asarray(w, dtype=np.float64)]
     here = _least(world, starts, counts)
-    log, known, solves = [here.g], [here.answer.mu], len(starts)
+    log, known, solves = [here], [here.answer.mu], len(starts)
     intervals, status = np.tile([0.0, 1.0], (len(here.w), 1)), Status.BUDGET
     for _ in range(n_rounds):
         try:
@@ -158,7 +158,7 @@ def cpirl_actions(
             1.0, float(np.abs(here.completed.mu).max())
         )
         here = there
-        log.append(here.g)
+        log.append(here)
         if here.is_explained or is_same:
             status = Status.MATCHED if here.is_explained else Status.CONVERGED
             break
@@ -172,7 +172,8 @@ def cpirl_actions(
         mdp,
         here.w,
         "simplex",
-        objective=np.array(log),
+        objective=np.array([e.g for e in log]),
+        iterates=np.array([e.w for e in log]),
         status=status,
         info=info,
         notes=notes,
@@ -209,8 +210,8 @@ def _round(
 
     def forward(w: Array) -> Response:
         nonlocal is_first, pi
-        pi = best_policy(mdp, mdp.reward(w), pi=pi).pi
-        mu = mdp.Phi.T @ Chain(mdp, pi).solve_transposed(mdp.start)
+        best = best_policy(mdp, mdp.reward(w), pi=pi)
+        pi, mu = best.pi, mdp.Phi.T @ best.chain.solve_transposed(mdp.start)
         evaluated = np.array(known) if is_first else np.empty((0, len(mu)))
         is_first = False
         return Response(pi, mu, evaluated=evaluated)

@@ -19,12 +19,17 @@ from walking_irl.baselines.recovered import from_start
 from walking_irl.cpirl import cpirl
 from walking_irl.errors import InvalidInputError
 from walking_irl.expert import check_expert
-from walking_irl.rl.chain import Chain
 from walking_irl.rl.demonstrations import Demonstrations
 from walking_irl.rl.finite_mdp import Actions, FiniteMDP
 from walking_irl.rl.tabular import best_policy, checked_policy
 from walking_irl.types import Expert, Forward, Response
 
+HOOKS = {
+    "policy_gradient": "policies with parameters and the gradient of their features",
+    "advantages": "deviations from a policy whose features can be told",
+    "nearest": "policies with parameters that can be compared",
+}
+"""What a world may offer beside its solver, in words; see :mod:`walking_irl.domains.contract`."""
 ARCHIVE_SOLVES = 60
 """Forward solves of the CPIRL run whose policies are an archive, where none is given."""
 
@@ -158,33 +163,78 @@ class Given:
         Raises:
             InvalidInputError: If the world or the expert does not offer it.
         """
-        hook: Callable[[Any], Array] | None = getattr(self.world, "policy_gradient", None)
-        if hook is None:
-            raise InvalidInputError(
-                f"{self.method} needs policies with parameters and the gradient of their features, "
-                f"{self.name} offers no policy_gradient"
-            )
+        G: Array = self.offered("policy_gradient")(self.shown)
+        return G
+
+    @property
+    def shown(self) -> Any:
+        """The expert's policy, as the world has policies.
+
+        Raises:
+            InvalidInputError: If only features are known.
+        """
         if not isinstance(self.data, Expert) or self.data.demonstration is None:
             raise InvalidInputError(
                 f"{self.method} needs the expert's policy: give an Expert with its demonstration"
             )
-        return hook(self.data.demonstration)
+        return self.data.demonstration
 
-    def archive(self, rng: np.random.Generator, max_solves: int = ARCHIVE_SOLVES) -> Array:
-        """Features of policies that a recovery by CPIRL evaluates, shape (n, K).
+    @property
+    def least(self) -> float:
+        """The world's lower bound of every weight."""
+        return float(getattr(getattr(self.world, "defaults", None), "min_weight", 0.0))
+
+    @property
+    def oracle(self) -> Forward:
+        """The solver, moved off the faces of the simplex where a world asks for that.
+
+        For methods whose queries are corners: where a weight vanishes the optimum may not exist.
+        """
+        forward = self.forward
+        share = float(getattr(getattr(self.world, "defaults", None), "interior", 0.0))
+        if self.is_finite or share == 0.0:
+            return forward
+        return lambda w: forward((1 - share) * w + share / len(w))
+
+    def offered(self, hook: str) -> Callable[..., Any]:
+        """What a world may offer beside its solver, by name.
+
+        Raises:
+            InvalidInputError: If this one does not.
+        """
+        found: Callable[..., Any] | None = getattr(self.world, hook, None)
+        if found is None:
+            raise InvalidInputError(
+                f"{self.method} needs {HOOKS[hook]}, {self.name} offers no {hook}"
+            )
+        return found
+
+    def archive(
+        self, rng: np.random.Generator, max_solves: int = ARCHIVE_SOLVES
+    ) -> tuple[Array, int]:
+        """Features of policies that a recovery by CPIRL evaluates, (n, K), and its solves.
 
         By cuts alone: Newton's method would need too few policies to surround the expert.
         """
-        forward = self.forward
+        forward, n_solves = self.forward, 0
 
         def cuts_only(w: Array) -> Response:
+            nonlocal n_solves
+            n_solves += 1
             return replace(forward(w), sensitivity=None)
 
-        run = cpirl(cuts_only, self.exact, mode="minimise", max_solves=max_solves, rng=rng)
+        run = cpirl(
+            cuts_only,
+            self.exact,
+            mode="minimise",
+            max_solves=max_solves,
+            min_weight=self.least,
+            rng=rng,
+        )
         rows = []
         for it in run:
             rows += [it.response.mu[None], it.response.evaluated.reshape(-1, it.w.size)]
-        return np.concatenate(rows)
+        return np.concatenate(rows), n_solves
 
 
 def solver(mdp: FiniteMDP) -> Forward:
@@ -193,8 +243,9 @@ def solver(mdp: FiniteMDP) -> Forward:
 
     def forward(w: Array) -> Response:
         nonlocal pi
-        pi = best_policy(mdp, mdp.reward(w), pi=pi).pi
-        return Response(pi, mdp.Phi.T @ Chain(mdp, pi).solve_transposed(mdp.start))
+        best = best_policy(mdp, mdp.reward(w), pi=pi)
+        pi = best.pi
+        return Response(pi, mdp.Phi.T @ best.chain.solve_transposed(mdp.start))
 
     return forward
 

@@ -81,24 +81,46 @@ class LogPosterior(NamedTuple):
     """Soft values, to start the next solve from, shape (S,)."""
 
 
-def kernel(X: Array, Y: Array, relevance: Array, beta: float, *, is_same: bool) -> Kernel:
-    """k(x, y) of all pairs; ``is_same`` says that X and Y are the same states."""
-    squares = (X[:, None] - Y[None]) ** 2
+def kernel(
+    X: Array,
+    Y: Array,
+    relevance: Array,
+    beta: float,
+    *,
+    is_same: bool,
+    squares: Array | None = None,
+) -> Kernel:
+    """k(x, y) of all pairs; ``is_same`` says that X and Y are the same states.
+
+    ``squares`` are their squared differences by feature, (n, m, d), where they are known.
+    """
+    if squares is None:
+        squares = (X[:, None] - Y[None]) ** 2
     differs = 1.0 - np.eye(len(X)) if is_same else np.ones((len(X), len(Y)))
     K = beta * np.exp(-0.5 * squares @ relevance - NOISE * relevance.sum() * differs)
     return Kernel(K, squares, differs)
 
 
-def inducing_kernel(X: Array, relevance: Array, beta: float) -> tuple[Array, Kernel]:
+def inducing_kernel(
+    X: Array, relevance: Array, beta: float, squares: Array | None = None
+) -> tuple[Array, Kernel]:
     """K_uu with its jitter, shape (m, m), and the kernel without it."""
-    plain = kernel(X, X, relevance, beta, is_same=True)
+    plain = kernel(X, X, relevance, beta, is_same=True, squares=squares)
     return plain.K + JITTER * beta * np.eye(len(X)), plain
 
 
 def log_posterior(
-    x: Array, mdp: FiniteMDP, counts: Array, X: Array, inducing: Indices, V: Array | None = None
+    x: Array,
+    mdp: FiniteMDP,
+    counts: Array,
+    X: Array,
+    inducing: Indices,
+    V: Array | None = None,
+    squares: Array | None = None,
 ) -> LogPosterior:
     """Objective and its gradient at x = (u, log Lambda, log beta), shape (m + d + 1,).
+
+    ``squares`` are the squared differences of the inducing states to all by feature, (m, S, d).
 
     With a = K^-1 u, g = dL/dr, B = K^-1 K_ur g: d/du = B - a,
     d/dK_uu = M = -B a' + a a'/2 - K^-1/2 + K^-3, d/dK_ur = N = a g'.
@@ -109,8 +131,9 @@ def log_posterior(
     """
     m, d = len(inducing), X.shape[1]
     u, relevance, beta = x[:m], np.exp(x[m : m + d]), math.exp(x[-1])
-    K, plain = inducing_kernel(X[inducing], relevance, beta)
-    cross = kernel(X[inducing], X, relevance, beta, is_same=False)
+    own = None if squares is None else squares[:, inducing]
+    K, plain = inducing_kernel(X[inducing], relevance, beta, own)
+    cross = kernel(X[inducing], X, relevance, beta, is_same=False, squares=squares)
     factor = cho_factor(K)
     inverse = cho_solve(factor, np.eye(m))
     a = inverse @ u
@@ -166,13 +189,14 @@ def gpirl(
     counts = demonstrations.counts(mdp.n_states, mdp.n_actions)
     inducing = inducing_states(X, counts, n_inducing, rng)
     m, d = len(inducing), X.shape[1]
+    squares = (X[inducing][:, None] - X[None]) ** 2
     V: Array | None = None
     log: list[float] = []
 
     def objective(x: Array) -> tuple[float, Array]:
         nonlocal V
         try:
-            L = log_posterior(x, mdp, counts, X, inducing, V)
+            L = log_posterior(x, mdp, counts, X, inducing, V, squares)
         except (LinAlgError, SolverError):
             return REFUSED, np.zeros_like(x)
         if not math.isfinite(L.value):

@@ -25,6 +25,7 @@ from walking_irl.arrays import Array
 from walking_irl.baselines.girl import girl
 from walking_irl.baselines.recovered import Recovered, positive
 from walking_irl.errors import InvalidInputError
+from walking_irl.rl.constraints import free_gradient
 from walking_irl.types import Status
 
 HEAVY = 1e3
@@ -74,16 +75,7 @@ def kkt_residual(G: Array, A: Array | None = None) -> Recovered:
     G = np.asarray(G, dtype=np.float64)
     if A is None:
         return girl(G)
-    A = np.asarray(A, dtype=np.float64)
-    if A.ndim != 2 or A.shape[1] != len(G) or not np.isfinite(A).all():
-        raise InvalidInputError(
-            f"the constraints' Jacobian must be finite with shape (m, {len(G)}), got {A.shape}"
-        )
-    scaled = A / np.maximum(np.linalg.norm(A, axis=1, keepdims=True), 1e-300)
-    Q, R = np.linalg.qr(scaled.T)
-    Q = Q[:, np.abs(np.diag(R)) > 1e-10]
-    free = G - Q @ (Q.T @ G)
-    return girl(free - Q @ (Q.T @ free))  # twice: multipliers are large where noise is
+    return girl(free_gradient(G, A))
 
 
 @dataclass

@@ -11,9 +11,10 @@ gradient of no function.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
+from scipy import sparse
 from scipy.optimize import minimize
 
 from walking_irl.arrays import Array
@@ -28,6 +29,8 @@ ADAM_RATE, ADAM_MEAN, ADAM_SQUARE = 0.05, 0.9, 0.99
 """Step length and forgetting factors of Adam (D. Kingma & J. Ba, 2015) for algorithm 1."""
 TINY = 1e-300
 """Stands for sums that underflow: states from which only hopeless paths lead on."""
+DENSE_SIZE = 30_000
+"""Entries of T up to which a product with the dense array is faster."""
 STOCHASTIC = "MaxEnt 2008 lets the agent choose what chance does: T is stochastic, prefer MCE"
 
 
@@ -45,15 +48,17 @@ class Backward(NamedTuple):
 def backward(mdp: FiniteMDP, reward: Array, horizon: int, discount: float = 1.0) -> Backward:
     """Partition functions of paths with ``horizon`` states; discount 1 is the paper's."""
     S, A = mdp.n_states, mdp.n_actions
+    T, _ = _transitions(mdp)
+    powers = (discount ** np.arange(horizon))[:, None] * reward
     log_Z, z = np.zeros((horizon, S)), np.ones((horizon, S))
     ahead, top = np.ones((horizon, A, S)), 0.0
     for t in range(horizon - 1, -1, -1):
         if t < horizon - 1:
-            top = float(log_Z[t + 1].max())
+            top = log_Z[t + 1].max()
             z[t] = np.exp(log_Z[t + 1] - top)
-            ahead[t] = (mdp.T @ z[t]).reshape(A, S)
+            ahead[t] = (T @ z[t]).reshape(A, S)
         total = np.maximum(ahead[t].sum(axis=0), TINY)
-        log_Z[t] = discount**t * reward + top + np.log(total)
+        log_Z[t] = powers[t] + top + np.log(total)
     return Backward(log_Z, ahead, z)
 
 
@@ -61,17 +66,29 @@ def expected_visits(
     mdp: FiniteMDP, passed: Backward, start: Array, visits: Visits, discount: float = 1.0
 ) -> Array:
     """sum_t g^t P(s_t = s), shape (S,), under the path measure or under the true dynamics."""
-    H = len(passed.log_Z)
-    d, total = start, np.zeros(mdp.n_states)
-    for t in range(H):
+    S, A = mdp.n_states, mdp.n_actions
+    _, back = _transitions(mdp)
+    shares = passed.ahead / np.maximum(passed.ahead.sum(axis=1, keepdims=True), TINY)
+    d, total = start, np.zeros(S)
+    for t, share in enumerate(shares):
         total += discount**t * d
-        ahead, z = passed.ahead[t], passed.z[t]
-        share = d / np.maximum(ahead.sum(axis=0), TINY)
+        if t == len(shares) - 1:
+            break
         if visits == "paths":  # P(s' | s) = sum_a T(s, a, s') Z(s') / sum_a ahead(a, s)
-            d = z * (mdp.T.T @ np.tile(share, mdp.n_actions))
+            ahead = np.maximum(passed.ahead[t].sum(axis=0), TINY)
+            d = passed.z[t] * (back @ np.tile(d / ahead, A))
         else:
-            d = mdp.T.T @ (share * ahead).ravel()
+            d = back @ (share * d).ravel()
     return total
+
+
+def _transitions(mdp: FiniteMDP) -> tuple[Any, Any]:
+    """T, shape (A S, S), and its transpose; dense where that is faster."""
+    if mdp.n_actions * mdp.n_states**2 <= DENSE_SIZE:
+        T = mdp.dense.reshape(-1, mdp.n_states)
+        return T, T.T
+    T = sparse.csr_array(mdp.T)
+    return T, T.T.tocsr()
 
 
 def maxent(
@@ -105,11 +122,13 @@ def maxent(
     start, H = demonstrations.start(mdp.n_states), demonstrations.horizon
     F_E = demonstrations.features(mdp.Phi, discount).mean(axis=0)
     log: list[float] = []
+    tried: list[Array] = []
 
     def likelihood(w: Array) -> tuple[float, Array]:
         passed = backward(mdp, mdp.Phi @ w, H, discount)
         gradient = F_E - mdp.Phi.T @ expected_visits(mdp, passed, start, visits, discount)
         log.append(float(w @ F_E - start @ passed.log_Z[0]))
+        tried.append(w.copy())
         return log[-1] - 0.5 * ridge * float(w @ w), gradient - ridge * w
 
     if visits == "paths":
@@ -131,6 +150,7 @@ def maxent(
         w,
         "free",
         objective=np.array(log),
+        iterates=np.array(tried),
         status=status,
         info={"solves": len(log), "residual": residual},
         notes=(STOCHASTIC,) if is_stochastic(mdp) else (),

@@ -21,6 +21,8 @@ from walking_irl.rl.finite_mdp import FiniteMDP
 from walking_irl.rl.soft import mce_loglik, soft_policy
 from walking_irl.types import Expert, Status
 
+Entry = tuple[float, Array]
+"""A line of a log: the objective, and the weights (K,) that it is of."""
 LIKELIHOOD_RIDGE = 1e-3
 MATCHING_RIDGE = 1e-2
 LARGE = 1e4
@@ -52,13 +54,13 @@ def mce_likelihood(
     counts = demonstrations.counts(mdp.n_states, mdp.n_actions)
     n, Phi = counts.sum(), mdp.Phi
     V: Array | None = None
-    log: list[float] = []
+    log: list[Entry] = []
 
     def objective(w: Array) -> tuple[float, Array]:
         nonlocal V
         L = mce_loglik(mdp, Phi @ w, counts, V=V)
         V = L.V
-        log.append(L.value / n)
+        log.append((L.value / n, w.copy()))
         return -L.value / n + 0.5 * ridge * w @ w, ridge * w - Phi.T @ L.gradient / n
 
     return _minimised(mdp, objective, log, max_iter, gtol=1e-5, ftol=2e-9)
@@ -103,13 +105,13 @@ def mce_matching(
     not_negative(ridge=ridge)
     positive(max_iter=max_iter)
     V: Array | None = None
-    log: list[float] = []
+    log: list[Entry] = []
 
     def objective(w: Array) -> tuple[float, Array]:
         nonlocal V
         value, gradient, V = soft_regret(mdp, w, expert.mu, V=V)
         value += 0.5 * ridge * float(w @ w)
-        log.append(value)
+        log.append((value, w.copy()))
         return value, gradient + ridge * w
 
     found = _minimised(mdp, objective, log, max_iter, gtol=1e-9, ftol=0.0)
@@ -127,7 +129,7 @@ def mce_matching(
 def _minimised(
     mdp: FiniteMDP,
     objective: Callable[[Array], tuple[float, Array]],
-    log: list[float],
+    log: list[Entry],
     max_iter: int,
     *,
     gtol: float,
@@ -145,7 +147,8 @@ def _minimised(
         mdp,
         np.asarray(result.x),
         "free",
-        objective=np.array(log),
+        objective=np.array([value for value, _ in log]),
+        iterates=np.array([w for _, w in log]),
         status=status,
         info={"solves": int(result.nfev)},
     )

@@ -8,15 +8,16 @@ for any features.
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Sequence
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
+from scipy import sparse
 
 from walking_irl.arrays import Array
 from walking_irl.baselines.recovered import Recovered, from_start, from_weights, positive
 from walking_irl.errors import InvalidInputError, SolverError
-from walking_irl.rl.chain import Chain
 from walking_irl.rl.demonstrations import Demonstrations
 from walking_irl.rl.finite_mdp import Actions, FiniteMDP
 from walking_irl.rl.tabular import best_policy
@@ -56,6 +57,8 @@ class Minimum(NamedTuple):
     c: float
     log: Array
     """Best c after each solve, shape (n,)."""
+    iterates: Array
+    """Weights of that c, shape (n, K)."""
     lower: float
     """Lower bound of c where cuts give one, else minus infinity."""
     cuts: tuple[Cut, ...]
@@ -82,7 +85,7 @@ def augmented(
         pi: Policy to start from, shape (S,).
     """
     best = best_policy(mdp, mdp.reward(w)[:, None] + loss, pi=pi)
-    x = Chain(mdp, best.pi).solve_transposed(mdp.start)
+    x = best.chain.solve_transposed(mdp.start)
     c = float(mdp.start @ best.V - w @ mu_E + 0.5 * ridge * w @ w)
     return Augmented(c, x, float(x @ loss[np.arange(x.size), best.pi]), best.pi)
 
@@ -138,7 +141,14 @@ def mmp(
         notes.append("no policy has the demonstrations' features: too few trajectories")
     info = {"solves": len(found.log), "c": found.c, "lower": found.lower}
     return from_weights(
-        mdp, found.w, "free", objective=found.log, status=status, info=info, notes=tuple(notes)
+        mdp,
+        found.w,
+        "free",
+        objective=found.log,
+        iterates=found.iterates,
+        status=status,
+        info=info,
+        notes=tuple(notes),
     )
 
 
@@ -170,6 +180,7 @@ def by_cuts(
     D = [mdp.Phi.T @ cut.visits - mu_E for cut in known]
     w, pi = np.zeros(len(mu_E)), None
     best, lower, log = (np.inf, w), -np.inf, []
+    at: list[Array] = []
     if known:
         w, lower = quadratic_program(np.array(D), _offsets(known), ridge, is_nonnegative)
     for _ in range(max_solves):
@@ -179,10 +190,11 @@ def by_cuts(
         known.append(Cut(found.visits, found.margin))
         D.append(mdp.Phi.T @ found.visits - mu_E)
         log.append(best[0])
+        at.append(best[1])
         if best[0] - lower <= tol * max(1.0, abs(best[0])):
             break
         w, lower = quadratic_program(np.array(D), _offsets(known), ridge, is_nonnegative)
-    return Minimum(best[1], best[0], np.array(log), lower, tuple(known))
+    return Minimum(best[1], best[0], np.array(log), np.array(at), lower, tuple(known))
 
 
 def _offsets(cuts: Sequence[Cut]) -> Array:
@@ -194,22 +206,32 @@ def quadratic_program(
 ) -> tuple[Array, float]:
     """Minimise ridge/2 |w|^2 + max_i (D_i.w + l_i): weights (K,) and the value.
 
+    Clarabel gets the program as it is: hundreds are solved, and to compile one takes longer.
+
     Raises:
         SolverError: If Clarabel fails.
     """
-    import cvxpy
-
-    w, z = cvxpy.Variable(D.shape[1]), cvxpy.Variable()
-    rules = [D @ w + loss <= z] + ([w >= 0] if is_nonnegative else [])
-    problem = cvxpy.Problem(cvxpy.Minimize(ridge / 2 * cvxpy.sum_squares(w) + z), rules)
-    try:
-        problem.solve(solver=cvxpy.CLARABEL)
-    except cvxpy.SolverError as error:
-        raise SolverError(f"the quadratic program of MMP has no solution: {error}") from error
-    if w.value is None:
-        raise SolverError(f"the quadratic program of MMP is {problem.status}")
-    value = np.maximum(w.value, 0.0) if is_nonnegative else w.value
-    return np.asarray(value), float(problem.value)
+    clarabel: Any = importlib.import_module("clarabel")
+    n, K = D.shape
+    rows, right = [np.c_[D, -np.ones(n)]], [-loss]  # of (w, z)
+    if is_nonnegative:
+        rows.append(np.c_[-np.eye(K), np.zeros(K)])
+        right.append(np.zeros(K))
+    b = np.concatenate(right)
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    found = clarabel.DefaultSolver(
+        sparse.csc_array(np.diag(np.r_[np.full(K, ridge), 0.0])),
+        np.r_[np.zeros(K), 1.0],
+        sparse.csc_array(np.concatenate(rows)),
+        b,
+        [clarabel.NonnegativeConeT(len(b))],
+        settings,
+    ).solve()
+    if str(found.status) not in ("Solved", "AlmostSolved"):
+        raise SolverError(f"the quadratic program of MMP has no solution: {found.status}")
+    w = np.array(found.x[:K])
+    return np.maximum(w, 0.0) if is_nonnegative else w, float(found.obj_val)
 
 
 def by_subgradients(
@@ -228,17 +250,19 @@ def by_subgradients(
     positive(ridge=ridge, n_steps=n_steps)
     w = average = np.zeros(len(mu_E))
     best, pi = (np.inf, w), None
-    log, cuts = [], []
+    log, at, cuts = [], [], []
     for t in range(n_steps):
         found = augmented(mdp, w, mu_E, loss, ridge, pi)
         pi = found.pi
         cuts.append(Cut(found.visits, found.margin))
         best = min(best, (found.c, w), key=lambda pair: pair[0])
         log.append(best[0])
+        at.append(best[1])
         subgradient = mdp.Phi.T @ found.visits - mu_E + ridge * w
         w = w - subgradient / (ridge * (t + 1))
         w = np.maximum(w, 0.0) if is_nonnegative else w
         average = average + 2 * (t + 1) / (n_steps * (n_steps + 1)) * w
     at_average = augmented(mdp, average, mu_E, loss, ridge, pi).c
     best = min(best, (at_average, average), key=lambda pair: pair[0])
-    return Minimum(best[1], best[0], np.array([*log, best[0]]), -np.inf, tuple(cuts))
+    log, at = [*log, best[0]], [*at, best[1]]
+    return Minimum(best[1], best[0], np.array(log), np.array(at), -np.inf, tuple(cuts))

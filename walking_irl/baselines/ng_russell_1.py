@@ -16,7 +16,6 @@ from scipy.optimize import linprog
 from walking_irl.arrays import Array, Indices
 from walking_irl.baselines.recovered import Recovered, not_negative, positive
 from walking_irl.errors import InvalidInputError, SolverError
-from walking_irl.rl.chain import Chain
 from walking_irl.rl.finite_mdp import Actions, FiniteMDP
 from walking_irl.rl.tabular import best_policy, checked_policy
 
@@ -83,11 +82,11 @@ def ng_russell_1(
     V = result.x[:S]
     reward = V - mdp.discount * (mdp.T @ V)[pi * S + np.arange(S)]
     reward[np.abs(reward) <= 1e-9 * r_max] = 0.0
-    own = best_policy(mdp, reward, pi=pi).pi
+    own = best_policy(mdp, reward, pi=pi)
     return Recovered(
         reward=reward,
-        policy=own,
-        mu=mdp.Phi.T @ Chain(mdp, own).solve_transposed(mdp.start),
+        policy=own.pi,
+        mu=mdp.Phi.T @ own.chain.solve_transposed(mdp.start),
         objective=np.array([-result.fun]),
         info={
             "l1": l1,

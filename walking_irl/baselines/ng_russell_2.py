@@ -67,6 +67,29 @@ def margin_program(
     return np.asarray(result.x[:K]), -float(result.fun)
 
 
+def ng_russell_2_sampled(
+    advantages: tuple[Array, Indices], *, penalty: float = PENALTY, is_simplex: bool = True
+) -> Recovered:
+    """The same where deviations from the policy are sampled, whatever the world is made of.
+
+    Args:
+        advantages: Rows of :func:`margin_program` and their states; all features in one scale.
+        penalty: Slope of p for negative arguments.
+        is_simplex: Whether weights are known to be >= 0; else |w_j| <= 1.
+
+    Returns:
+        Weights whose error is of the order of the deviations' size; no forward solve is needed.
+    """
+    X, owner = advantages
+    largest = max(float(np.abs(X).max(initial=0.0)), 1e-300)
+    w, value = margin_program(X / largest, owner, penalty=penalty, is_simplex=is_simplex)
+    if is_simplex:
+        w = np.maximum(w, 0.0) / np.maximum(w, 0.0).sum()
+    info = {"n_rows": len(X), "solves": 0}
+    space: Space = "simplex" if is_simplex else "box"
+    return Recovered(w=w, space=space, objective=np.array([value]), info=info)
+
+
 def advantage_rows(
     mdp: FiniteMDP, pi: Actions, states: Indices, *, Psi: Array | None = None
 ) -> tuple[Array, Indices]:

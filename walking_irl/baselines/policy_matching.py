@@ -48,8 +48,9 @@ def boltzmann_policy(
 
     d pi = beta pi (dQ - sum_b pi dQ). Q* has kinks where actions tie: one of its slopes is taken.
     """
-    greedy = best_policy(mdp, mdp.reward(w), pi=pi).pi
-    dQ = successor(mdp, greedy)
+    best = best_policy(mdp, mdp.reward(w), pi=pi)
+    greedy = best.pi
+    dQ = successor(mdp, greedy, chain=best.chain)
     q = beta * (dQ @ w)
     P = np.exp(q - q.max(axis=1, keepdims=True))
     P /= P.sum(axis=1, keepdims=True)
@@ -107,6 +108,7 @@ def match_policy(
     root = np.sqrt(visits)[:, None]
     last: Matched | None = None
     log: list[float] = []
+    tried: list[Array] = []
 
     def at(v: Array) -> Matched:
         nonlocal last
@@ -114,6 +116,7 @@ def match_policy(
         residual = (root * (P - policy)).ravel()
         last = Matched(residual, (root[:, :, None] * dP).reshape(-1, v.size), greedy)
         log.append(float(residual @ residual))
+        tried.append(np.array(v))
         return last
 
     if step == "trust-region":
@@ -139,7 +142,8 @@ def match_policy(
         w, is_done = _descend(at, w, step, max_solves, log)
     status = Status.CONVERGED if is_done else Status.BUDGET
     info = {"solves": len(log), "J": min(log)}
-    return from_weights(mdp, w, "free", objective=np.array(log), status=status, info=info)
+    kept_log = {"objective": np.array(log), "iterates": np.array(tried)}
+    return from_weights(mdp, w, "free", **kept_log, status=status, info=info)
 
 
 def natural_step(residual: Array, jacobian: Array) -> Array:

@@ -16,15 +16,17 @@ from scipy.special import logsumexp
 
 from walking_irl.arrays import Array, Indices
 from walking_irl.baselines.recovered import Recovered, from_weights, positive
-from walking_irl.errors import InvalidInputError
+from walking_irl.errors import InvalidInputError, SolverError
 from walking_irl.rl.demonstrations import Demonstrations
 from walking_irl.rl.finite_mdp import Actions, FiniteMDP
 from walking_irl.rl.successor import successor
-from walking_irl.rl.tabular import best_policy
+from walking_irl.rl.tabular import MAX_IMPROVEMENTS, best_policy
 from walking_irl.types import Status
 
 KEPT_POINTS, KEPT_POLICIES = 50_000, 500
 """Grid points whose posterior is remembered, and policies whose successor features are."""
+FEW = 100.0
+"""Independent samples below which a chain's intervals are rough."""
 TIE = 1e-9
 """Relative gain of an action over the policy's below which the policy still counts as greedy."""
 
@@ -57,22 +59,31 @@ class Posterior:
 
     def at(self, w: Array, near: Place | None = None) -> Place:
         """The posterior of weights w, shape (K,), starting from the policy of a near place."""
-        start = None
-        if near is not None:
-            Q = near.Psi @ w
-            own = np.take_along_axis(Q, near.pi[:, None], axis=1)[:, 0]
-            if (Q.max(axis=1) <= own + TIE * max(1.0, float(np.abs(Q).max()))).all():
-                return near._replace(log_posterior=self._log_likelihood(Q))
-            start = near.pi
-        self.n_solves += 1
-        pi = best_policy(self.mdp, self.mdp.Phi @ w, pi=start).pi
+        if near is None:
+            pi = best_policy(self.mdp, self.mdp.Phi @ w).pi
+            Psi, self.n_solves = self._successor(pi), self.n_solves + 1
+            return Place(pi, Psi, self._log_likelihood(Psi @ w))
+        pi, Psi, n_improved = near.pi, near.Psi, 0
+        while True:  # policy iteration: successor features evaluate a policy for any weights
+            Q = Psi @ w
+            own = np.take_along_axis(Q, pi[:, None], axis=1)[:, 0]
+            is_better = Q.max(axis=1) > own + TIE * max(1.0, float(np.abs(own).max()))
+            if not is_better.any():
+                self.n_solves += n_improved > 0
+                return Place(pi, Psi, self._log_likelihood(Q))
+            if n_improved == MAX_IMPROVEMENTS:
+                raise SolverError(f"the policy still changes after {n_improved} improvements")
+            pi = np.where(is_better, Q.argmax(axis=1), pi)
+            Psi, n_improved = self._successor(pi), n_improved + 1
+
+    def _successor(self, pi: Actions) -> Array:
+        """Successor features of a policy, remembered."""
         key = pi.tobytes()
         if key not in self._successors:
             if len(self._successors) >= KEPT_POLICIES:
                 self._successors.clear()
             self._successors[key] = successor(self.mdp, pi)
-        Psi = self._successors[key]
-        return Place(pi, Psi, self._log_likelihood(Psi @ w))
+        return self._successors[key]
 
     def _log_likelihood(self, Q: Array) -> float:
         """Sum of c(s, a) [alpha Q(s, a) - log sum_b exp alpha Q(s, b)]."""
@@ -143,8 +154,35 @@ def policywalk(
         space,
         samples=samples,
         objective=log[burn_in:],
-        status=Status.BUDGET,
+        iterates=samples,
+        status=Status.SAMPLED,
         info=info,
+        notes=_notes(samples, delta * top if is_box else None),
+    )
+
+
+def _notes(samples: Array, bound: float | None) -> tuple[str, ...]:
+    """What a reader of the posterior should know of its chain."""
+    notes = list(mixing(samples))
+    if bound is not None:
+        share = float((np.abs(samples).max(axis=1) > bound - 1e-9).mean())
+        if share > 0.5:
+            notes.append(
+                f"a weight lies at the bound of the box in {100 * share:.0f} % of the samples: the "
+                "expert acts with more certainty than the box allows, and the intervals are too "
+                "narrow; the ratios of weights still say what it prefers"
+            )
+    return tuple(notes)
+
+
+def mixing(samples: Array) -> tuple[str, ...]:
+    """A warning where a chain is worth few independent samples."""
+    least = float(effective_sample_sizes(samples).min())
+    if least >= FEW:
+        return ()
+    return (
+        f"the chain is worth {least:.0f} independent samples of its weakest weight: draw more "
+        "before you trust its intervals",
     )
 
 

@@ -10,7 +10,6 @@ import numpy as np
 
 from walking_irl.arrays import Array
 from walking_irl.errors import InvalidInputError
-from walking_irl.rl.chain import Chain
 from walking_irl.rl.demonstrations import Demonstrations
 from walking_irl.rl.finite_mdp import FiniteMDP
 from walking_irl.rl.tabular import best_policy
@@ -33,6 +32,8 @@ class Recovered:
         mu: Feature expectations of that policy, shape (K,).
         samples: Weights drawn from a posterior, shape (m, K).
         objective: The method's objective after each iteration, shape (n,).
+        iterates: The weights that each of these entries is of, shape (n, K), where it is of some;
+            they may be in another scale than ``w``.
         status: Why it ended.
         info: Figures of the method (forward solves, effective sample size, intervals, ...).
         notes: Sentences that a reader of the answer should know.
@@ -45,6 +46,7 @@ class Recovered:
     mu: Array | None = None
     samples: Array | None = None
     objective: Array = field(default_factory=lambda: np.empty(0))
+    iterates: Array | None = None
     status: Status = Status.CONVERGED
     info: Mapping[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
@@ -55,13 +57,18 @@ class Recovered:
                 f"weights come with their space, one of {', '.join(get_args(Space))}; got "
                 f"{'no ' if self.w is None else ''}weights and {self.space!r}"
             )
+        if self.iterates is not None and len(self.iterates) != len(self.objective):
+            raise InvalidInputError(
+                f"each entry of the log needs its weights, got {len(self.iterates)} for "
+                f"{len(self.objective)}"
+            )
 
 
 def from_reward(mdp: FiniteMDP, reward: Array, **fields: Any) -> Recovered:
     """A recovered tabular reward with its optimal policy and that policy's features."""
-    pi = best_policy(mdp, reward).pi
-    mu = mdp.Phi.T @ Chain(mdp, pi).solve_transposed(mdp.start)
-    return Recovered(reward=reward, policy=pi, mu=mu, **fields)
+    best = best_policy(mdp, reward)
+    mu = mdp.Phi.T @ best.chain.solve_transposed(mdp.start)
+    return Recovered(reward=reward, policy=best.pi, mu=mu, **fields)
 
 
 def from_weights(mdp: FiniteMDP, w: Array, space: Space, **fields: Any) -> Recovered:

@@ -20,12 +20,13 @@ from walking_irl.baselines.cpirl_actions import cpirl_actions
 from walking_irl.baselines.girl import girl
 from walking_irl.baselines.given import Given
 from walking_irl.baselines.gpirl import gpirl
+from walking_irl.baselines.inverse_optimal_control import bilevel_gauss_newton, bilevel_search
 from walking_irl.baselines.maxent import maxent
 from walking_irl.baselines.mce import mce_likelihood, mce_matching
 from walking_irl.baselines.mmp import mmp
 from walking_irl.baselines.mmp_boost import mmp_boost
 from walking_irl.baselines.ng_russell_1 import ng_russell_1
-from walking_irl.baselines.ng_russell_2 import ng_russell_2
+from walking_irl.baselines.ng_russell_2 import ng_russell_2, ng_russell_2_sampled
 from walking_irl.baselines.ng_russell_3 import ng_russell_3
 from walking_irl.baselines.policy_matching import policy_matching
 from walking_irl.baselines.policywalk import policywalk
@@ -37,7 +38,7 @@ from walking_irl.types import Expert
 
 FINITE, LQR, PATH, HUMANOID = "finite", "LQR", "walking path", "humanoid"
 EVERYWHERE = (FINITE, LQR, PATH, HUMANOID)
-EXACT_GRADIENTS = (LQR, PATH)
+CONTINUOUS = (LQR, PATH, HUMANOID)
 
 
 class Needs(Enum):
@@ -46,7 +47,7 @@ class Needs(Enum):
     POLICY = "complete policy"
     FEATURES = "feature expectations"
     ACTIONS = "states and actions"
-    GRADIENT = "policy and its gradient"
+    GRADIENT = "policy and its derivatives"
 
 
 class Method(NamedTuple):
@@ -76,6 +77,8 @@ class Method(NamedTuple):
     """What stands for it where there are not finitely many states."""
     extra: str = ""
     """Optional extra of this package that it needs, or none."""
+    hook: str = ""
+    """What a world must offer where there are not finitely many states, or nothing."""
 
     def options(self, is_finite: bool) -> tuple[str, ...]:
         """Settings that it takes in a finite world, or elsewhere."""
@@ -85,11 +88,18 @@ class Method(NamedTuple):
         names = {
             p.name for p in inspect.signature(function).parameters.values() if p.kind is KEYWORD
         }
-        return tuple(sorted(names - NOT_OPTIONS | ({"archive"} if has_archive else set())))
+        own = OWN.get(function, set()) if has_archive else set()
+        return tuple(sorted(names - NOT_OPTIONS | own))
 
 
 KEYWORD = inspect.Parameter.KEYWORD_ONLY
 NOT_OPTIONS = {"rng", "setting"}
+OWN: dict[Callable[..., Any], set[str]] = {
+    archive_maxent: {"archive"},
+    archive_posterior: {"archive"},
+    ng_russell_2_sampled: {"size"},
+}
+"""Options of adapters outside of finite worlds."""
 P, F, A, G = Needs
 METHODS: dict[str, Method] = {
     method.name: method
@@ -101,8 +111,8 @@ METHODS: dict[str, Method] = {
         ),
         Method(
             "ng-russell-2", "Ng & Russell 2000, section 4", P, True, True, "linear", "none",
-            "weights", "none: a heuristic penalty at sampled states", (FINITE,),
-            run.run_ng_russell_2, ng_russell_2,
+            "weights", "none: a heuristic penalty at sampled states", EVERYWHERE,
+            run.run_ng_russell_2, ng_russell_2, ng_russell_2_sampled, "", "advantages",
         ),
         Method(
             "ng-russell-3", "Ng & Russell 2000, section 5", F, False, True, "linear", "3 to 10",
@@ -130,13 +140,19 @@ METHODS: dict[str, Method] = {
         ),
         Method(
             "neu-szepesvari", "Neu & Szepesvari 2007", A, True, True, "least squares, not convex",
-            "10 to 60", "weights", "a local minimum of the distance of policies", (FINITE,),
-            run.run_policy_matching, policy_matching,
+            "10 to 60", "weights", "a local minimum of the distance of policies", EVERYWHERE,
+            run.run_policy_matching, policy_matching, bilevel_gauss_newton, "", "nearest",
         ),
         Method(
             "girl", "Pirotta & Restelli 2016", G, False, True, "non-negative least squares",
-            "none", "weights", "exact for an optimal expert with exact gradients", EXACT_GRADIENTS,
-            run.run_girl, girl,
+            "none", "weights", "exact for an optimal expert with exact gradients", CONTINUOUS,
+            run.run_girl, girl, None, "", "policy_gradient",
+        ),
+        Method(
+            "bilevel-search", "Mombaur, Truong & Laumond 2010", G, False, True,
+            "trust region without derivatives", "30 to 100", "weights",
+            "a local minimum of the distance of policies", CONTINUOUS,
+            run.run_bilevel_search, bilevel_search, None, "", "nearest",
         ),
         Method(
             "mwal", "Syed & Schapire 2007", F, False, True, "multiplicative weights", "100",
@@ -150,8 +166,8 @@ METHODS: dict[str, Method] = {
         ),
         Method(
             "maxent", "Ziebart et al. 2008", A, True, True, "convex", "10 to 400",
-            "weights", "features of paths matched; exact for deterministic worlds", (FINITE,),
-            run.run_maxent, maxent,
+            "weights", "features of paths matched; exact for deterministic worlds", EVERYWHERE,
+            run.run_maxent, maxent, archive_maxent,
         ),
         Method(
             "mce-likelihood", "Ziebart 2010", A, True, True, "concave", "10",

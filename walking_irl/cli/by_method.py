@@ -3,18 +3,28 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from walking_irl.cli import DONE
+from walking_irl.cli import DONE, INTERRUPTED
+from walking_irl.cli.earlier import keep_earlier
 from walking_irl.cli.side_by_side import workers_for
 from walking_irl.domains import load
-from walking_irl.errors import InvalidInputError
-from walking_irl.files import check_outputs, write_json
+from walking_irl.errors import (
+    FallError,
+    InvalidInputError,
+    RecordingError,
+    SolverError,
+    WalkingIRLError,
+)
+from walking_irl.files import check_ending, check_outputs, write_json
 from walking_irl.run.setup import HORIZON, TRAJECTORIES, Setup
+from walking_irl.workers import interrupts_kept
 
 if TYPE_CHECKING:
     from walking_irl.run.by_method import MethodReport
@@ -26,7 +36,7 @@ CPIRL_ONLY = ("centre", "mode", "max_solves", "expert_gap", "min_weight")
 def add_arguments(p: argparse.ArgumentParser) -> None:
     """Arguments that choose another method."""
     group = p.add_argument_group("another method", "they list themselves: walking-irl methods")
-    group.add_argument("--method", metavar="NAME", help="explain the expert by it; no recording")
+    group.add_argument("--method", metavar="NAME", help="explain the expert by it")
     group.add_argument(
         "--trajectories",
         type=int,
@@ -57,10 +67,14 @@ def run(args: argparse.Namespace, given: dict[str, Any], console: Console) -> in
     own += ["--archive"] if args.archive is not None else []
     if own:
         raise InvalidInputError(f"{', '.join(own)}: CPIRL only, leave out with --method")
-    check_outputs([args.json], inputs=[given.get("demonstration")])
     horizon = HORIZON if args.horizon is None else args.horizon
     setup = Setup(**given)
-    with workers_for(load(setup.domain)) as executor:
+    domain = load(setup.domain)
+    default = Path(f"{domain.defaults.files or setup.domain}-{args.method}.rrd")
+    record = None if args.no_record else args.record or default
+    check_ending(record, ".rrd")
+    check_outputs([args.json, record], inputs=[setup.demonstration])
+    with workers_for(domain) as executor:
         report = recover_by(
             args.method,
             setup,
@@ -68,10 +82,36 @@ def run(args: argparse.Namespace, given: dict[str, Any], console: Console) -> in
             horizon=horizon,
             executor=executor,
         )
+    if args.record is None:
+        keep_earlier([record], console)
+    report, trouble = _recorded(report, record)
     if args.json is not None:
         write_json(args.json, report.to_json())
     show(report, console)
-    return DONE
+    if isinstance(trouble, WalkingIRLError):
+        raise trouble
+    return DONE if trouble is None else INTERRUPTED
+
+
+def _recorded(
+    report: MethodReport, path: Path | None
+) -> tuple[MethodReport, KeyboardInterrupt | WalkingIRLError | None]:
+    """The report with its recording, and what cut that short: the result is not lost with it."""
+    if path is None:
+        return report, None
+    from walking_irl.run.method_film import record_report
+
+    try:
+        with interrupts_kept():
+            record_report(report, path)
+    except RecordingError as error:
+        return report, error
+    except (KeyboardInterrupt, SolverError, FallError) as trouble:  # written as far as it came
+        notes = getattr(trouble, "__notes__", [])  # of a recording that could not be written
+        if notes:
+            return report, RecordingError(notes[0])
+        return replace(report, recording=str(path)), trouble
+    return replace(report, recording=str(path)), None
 
 
 def show(report: MethodReport, console: Console) -> None:
@@ -100,8 +140,10 @@ def show(report: MethodReport, console: Console) -> None:
             f"{100 * report.relative_loss:.5f} %"
         )
     solves = report.found.info.get("solves")
-    counted = "" if solves is None else f"{solves} forward solves, "
+    counted = "" if solves is None else f"{solves} forward solve{'s' * (solves != 1)}, "
     console.print(f"{counted}{report.seconds:.2f} s")
+    if report.recording is not None:
+        console.print(f"recording {escape(report.recording)}: walking-irl view {report.recording}")
     for note in report.found.notes:
         console.print(escape(note))
 

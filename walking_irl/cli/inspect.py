@@ -33,8 +33,17 @@ def run(args: argparse.Namespace, console: Console) -> int:
     if content["objectives"]:
         console.print(_table_of_recording(content))
     for key in (
-        *("domain", "seed", "centre", "mode", "status", "ending", "rule", "certificate"),
-        *("bracket", "how_sure", "volume_ratio", "condition_number", "weakest", "gauge", "noise"),
+        *("domain", "method", "seed", "centre", "mode", "status", "ending", "rule", "certificate"),
+        *(
+            "bracket",
+            "how_sure",
+            "volume_ratio",
+            "condition_number",
+            "weakest",
+            "gauge",
+            "noise",
+            "loss",
+        ),
     ):
         if content[key] is not None:
             console.print(f"{key.replace('_', ' ')}: {escape(_short(content[key]))}")
@@ -49,24 +58,25 @@ def run(args: argparse.Namespace, console: Console) -> int:
 
 
 def _table_of_recording(content: dict[str, Any]) -> Table:
-    """Weights by objective; a recording of one motion alone has no more of them."""
-    if content["intervals"] is None:
-        table = Table("objective", "weight")
-        for name, w in zip(content["objectives"] or [], content["w"] or [], strict=False):
-            table.add_row(str(name), f"{w:.4f}")
-        return table
-    table = Table("objective", "ground truth", "recovered", "interval", "per raw unit")
+    """Weights by objective, as far as they are known; one motion alone has its weights only."""
     truth, found, bounds = content["w_expert"], content["w"], content["intervals"]
-    physical = content["physical_intervals"]
-    for j, name in enumerate(content["objectives"]):
-        unit = per_unit(physical[j], content["units"][j]).replace(" per ", "\nper ")
-        table.add_row(
-            str(name),
-            "unknown" if truth is None else f"{truth[j]:.4f}",
-            f"{found[j]:.4f}",
-            f"{bounds[j][0]:.4f} .. {bounds[j][1]:.4f}",
-            unit,
-        )
+    physical, is_run = content["physical_intervals"], content["iterations"] is not None
+    columns: dict[str, list[str]] = {"objective": [str(name) for name in content["objectives"]]}
+    if is_run:
+        known = truth or ["unknown"] * len(columns["objective"])
+        columns["ground truth"] = [w if isinstance(w, str) else f"{w:.4f}" for w in known]
+    if found is not None:
+        columns["recovered" if is_run else "weight"] = [f"{w:.4f}" for w in found]
+    if bounds is not None:
+        columns["interval"] = [f"{low:.4f} .. {high:.4f}" for low, high in bounds]
+    if physical is not None:
+        pairs = zip(physical, content["units"], strict=True)
+        columns["per raw unit"] = [
+            per_unit(bound, unit).replace(" per ", "\nper ") for bound, unit in pairs
+        ]
+    table = Table(*columns)
+    for row in zip(*columns.values(), strict=True):
+        table.add_row(*row)
     return table
 
 

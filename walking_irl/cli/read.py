@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import Console
@@ -14,6 +14,9 @@ from rich.table import Table
 from walking_irl.cli import DONE
 from walking_irl.errors import InvalidInputError
 from walking_irl.files import check_ending, check_outputs, write_file, write_json
+
+if TYPE_CHECKING:
+    from walking_irl.domains.humanoid.recorded.person import Options
 
 
 def add_parser(commands: Any) -> argparse.ArgumentParser:
@@ -29,12 +32,7 @@ def add_parser(commands: Any) -> argparse.ArgumentParser:
         help="joint angles (.mot, .sto, .csv, .npz), several trials of one person are averaged; "
         "ground reaction forces (.mot) of the same walks",
     )
-    p.add_argument("--from", dest="start", type=float, metavar="S", help="leave out what is before")
-    p.add_argument("--to", dest="stop", type=float, metavar="S", help="leave out what is after")
-    p.add_argument("--height", type=float, metavar="M", help="of the person, where it is known")
-    p.add_argument("--belt", type=float, metavar="M/S", help="speed of the treadmill")
-    p.add_argument("--cycle-time", type=float, metavar="S", help="for tables in percent of a cycle")
-    p.add_argument("--convention", choices=("opensim", "clinical"), help="whose signs (by names)")
+    add_options(p)
     p.add_argument("--save", type=Path, metavar="FILE.npz|FILE.csv", help="write the mean cycle")
     p.add_argument(
         "--plot", type=Path, metavar="FILE.svg", help="draw the curves on norms and the model"
@@ -44,23 +42,55 @@ def add_parser(commands: Any) -> argparse.ArgumentParser:
     return p
 
 
+def add_options(p: Any) -> None:
+    """What the user knows better than the files."""
+    p.add_argument("--from", dest="start", type=float, metavar="S", help="leave out what is before")
+    p.add_argument("--to", dest="stop", type=float, metavar="S", help="leave out what is after")
+    p.add_argument("--height", type=float, metavar="M", help="of the person, where it is known")
+    p.add_argument("--belt", type=float, metavar="M/S", help="speed of the treadmill")
+    p.add_argument("--cycle-time", type=float, metavar="S", help="for tables in percent of a cycle")
+    p.add_argument("--convention", choices=("opensim", "clinical"), help="whose signs (by names)")
+
+
+FLAGS = {
+    "start": "--from",
+    "stop": "--to",
+    "height": "--height",
+    "belt": "--belt",
+    "cycle_time": "--cycle-time",
+    "convention": "--convention",
+}
+"""Of these options, by the names of :class:`~.recorded.person.Options`."""
+
+
+def options_of(args: argparse.Namespace) -> Options:
+    """These options.
+
+    Raises:
+        InvalidInputError: If one is no number.
+    """
+    from walking_irl.domains.humanoid.recorded.person import Options
+
+    for name, flag in FLAGS.items():
+        value = getattr(args, name)
+        if isinstance(value, float) and not np.isfinite(value):
+            raise InvalidInputError(f"{flag[2:]} must be a number, got {value}")
+    return Options(**{name: getattr(args, name) for name in FLAGS})
+
+
 def run(args: argparse.Namespace, console: Console) -> int:
     """``walking-irl read``."""
     from walking_irl.domains.humanoid.body.load import load_walker
     from walking_irl.domains.humanoid.gait.curves import likeness
     from walking_irl.domains.humanoid.gait.files import save_gait
     from walking_irl.domains.humanoid.gait.realism import leg_length
-    from walking_irl.domains.humanoid.recorded.person import Options
     from walking_irl.domains.humanoid.recorded.person_curves import person_curves
     from walking_irl.domains.humanoid.recorded.reader import read_person
 
     check_ending(args.save, ".npz", ".csv")
     check_ending(args.plot, ".svg")
     check_outputs([args.save, args.plot, args.json], inputs=args.files)
-    options = Options(
-        args.start, args.stop, args.height, args.belt, args.cycle_time, args.convention
-    )
-    _check_numbers(args)
+    options = options_of(args)
     walker = load_walker()
     person = read_person(args.files, walker, options)
     if args.save is not None:
@@ -92,13 +122,6 @@ def _picture(person: Any, curves: Any, walker: Any) -> str:
     names = ", ".join(p.name for p in person.sources)
     norms = norm_set("adults", person.gait.speed, leg_length(walker))
     return curves_picture(names, walks, norms, "adults at self-selected speed, mean and 1 s.d.")
-
-
-def _check_numbers(args: argparse.Namespace) -> None:
-    for name in ("start", "stop", "height", "belt", "cycle_time"):
-        value = getattr(args, name)
-        if value is not None and not np.isfinite(value):
-            raise InvalidInputError(f"{name.replace('_', '-')} must be a number, got {value}")
 
 
 def to_json(person: Any) -> dict[str, Any]:

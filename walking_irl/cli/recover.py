@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import fields, replace
-from itertools import count
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 
 from walking_irl.cli import DONE, FAILED, INTERRUPTED, by_method, walk
+from walking_irl.cli.earlier import keep_earlier
 from walking_irl.cli.side_by_side import workers_for
 from walking_irl.cli.terminal import Terminal, show_report
 from walking_irl.cli.weights import parse_weights
@@ -156,7 +156,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
         rollouts = setup.record.with_suffix(".npz")
     _check_files(setup, rollouts, args)
     if args.record is None and before is None:
-        _keep_earlier([setup.record, rollouts, setup.checkpoint], console)
+        keep_earlier([setup.record, rollouts, setup.checkpoint], console)
     if not args.quiet:
         source = "solving for" if before is None else f"{args.resume} knows"
         console.print(f"{setup.domain}: {source} the expert ...")
@@ -229,20 +229,6 @@ def _check_files(setup: Setup, rollouts: Path | None, args: argparse.Namespace) 
     check_outputs([*outputs, setup.checkpoint], inputs=[setup.demonstration])
     if args.resume is not None:  # its checkpoint goes on in the same file
         check_outputs(outputs, inputs=[args.resume])
-
-
-def _keep_earlier(paths: Sequence[Path | None], console: Console) -> None:
-    """Number an earlier run's files of the default names, and say so in one line."""
-    there = [path for path in paths if path is not None and path.is_file()]
-    if there:
-        numbers = (n for n in count(1) if not any(_numbered(p, n).exists() for p in there))
-        kept = [path.rename(_numbered(path, n)) for n in [next(numbers)] for path in there]
-        console.print(f"an earlier run is kept: {', '.join(map(str, kept))}")
-
-
-def _numbered(path: Path, n: int) -> Path:
-    stem, ending = path.name.split(".", 1)
-    return path.with_name(f"{stem}.{n}.{ending}")
 
 
 def _asked(args: argparse.Namespace) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from walking_irl.cli import DONE
+from walking_irl.cli.read import FLAGS, add_options, options_of, to_json
 from walking_irl.errors import InvalidInputError
 from walking_irl.files import check_ending, check_outputs, write_json
 from walking_irl.workers import workers
@@ -26,8 +27,9 @@ if TYPE_CHECKING:
 RESTS_ON = (
     "5. What it rests on: one body with these objectives for everybody (the recording is "
     "scaled to its legs); of all gaits as near to the recording, the one that is cheapest for the "
-    "weights; joint angles alone, forces are compared only; habits, pain and muscles that the body "
-    "has not got count as weights."
+    "weights; of weights that the walk leaves open, those nearer to the reference; vertical forces "
+    "where they were measured, else joint angles alone; habits, pain and muscles that the body has "
+    "not got count as weights."
 )
 
 
@@ -63,6 +65,8 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
         help="give weights even where the body cannot follow the walk",
     )
 
+    add_options(group)
+
 
 def refuse_alone(args: argparse.Namespace) -> None:
     """Complain about arguments that need ``--walk``.
@@ -70,8 +74,9 @@ def refuse_alone(args: argparse.Namespace) -> None:
     Raises:
         InvalidInputError: If one is given without it.
     """
-    if args.accept_habit:
-        raise InvalidInputError("--accept-habit goes with --walk")
+    for name, flag in {"accept_habit": "--accept-habit", **FLAGS}.items():
+        if getattr(args, name) is not None and getattr(args, name) is not False:
+            raise InvalidInputError(f"{flag} goes with --walk")
 
 
 def run(args: argparse.Namespace, given: dict[str, Any], console: Console) -> int:
@@ -81,7 +86,8 @@ def run(args: argparse.Namespace, given: dict[str, Any], console: Console) -> in
     _refuse_others(args, given)
     check_ending(args.record, ".rrd")
     check_outputs([args.json, args.record], inputs=[p for paths in args.walk for p in paths])
-    people = [_read(paths, HUMANOID.walker) for paths in args.walk]
+    options = options_of(args)
+    people = [_read(paths, HUMANOID.walker, options) for paths in args.walk]
     answers = []
     with workers() as executor:
         for person, trials in people:
@@ -109,12 +115,12 @@ def _refuse_others(args: argparse.Namespace, given: dict[str, Any]) -> None:
         )
 
 
-def _read(paths: Sequence[Path], walker: Any) -> tuple[Person, list[Person]]:
+def _read(paths: Sequence[Path], walker: Any, options: Any) -> tuple[Person, list[Person]]:
     """A person, and each trial where there are several."""
     from walking_irl.domains.humanoid.recorded.person import averaged
     from walking_irl.domains.humanoid.recorded.reader import read_trials
 
-    trials = read_trials(paths, walker)
+    trials = read_trials(paths, walker, options)
     return (averaged(trials), trials) if len(trials) > 1 else (trials[0], [])
 
 
@@ -123,10 +129,9 @@ def _explain(
 ) -> Answer:
     from walking_irl.domains.humanoid.recorded.feasible import check_habit
     from walking_irl.domains.humanoid.spec import HUMANOID
-    from walking_irl.run.joint import Walk
     from walking_irl.run.walk import explain, nearest
 
-    walks = [Walk(p.gait, p.missing) for p in (person, *trials)]
+    walks = [p.walk for p in (person, *trials)]
     names = escape(", ".join(p.name for p in person.sources))
     _say(
         f"{names}: {person.speed:.2f} m/s; looking for the nearest gait of the body ...",
@@ -176,7 +181,7 @@ def _show(answer: Answer, spec: Any, console: Console) -> None:
 
 def _weights(answer: Answer, spec: Any) -> Table:
     found = answer.found
-    table = Table("objective", "weight", "half width", "of it: slack", "starts", "trials")
+    table = Table("objective", "weight", "half width", "of it: walk", "starts", "trials")
     rows = zip(found.w, found.half, found.allowed, found.starts, found.trials, strict=True)
     for objective, numbers in zip(spec.stack.objectives, rows, strict=True):
         table.add_row(objective.name, *(f"{v:.3f}" for v in numbers))
@@ -184,29 +189,33 @@ def _weights(answer: Answer, spec: Any) -> Table:
 
 
 def _record(path: Path, answer: Answer, spec: Any) -> None:
-    """Three walkers: recorded, best for the weights, nearest; of the first person."""
-    from walking_irl.domains.humanoid.gait.gait import cycle_motion
-    from walking_irl.recording import record_motion
-    from walking_irl.recording.views.motion import periodic_rollout
-    from walking_irl.recording.views.people import PersonView
+    """The first person's answer, as a recording."""
+    from walking_irl.run.walk_film import record_explanation
 
-    end, walker = answer.found.end, spec.walker
-    shown, near, best = (
-        periodic_rollout(*cycle_motion(g, walker.mirror), g.timestep, 2 * g.step_length)
-        for g in (answer.person.gait, end.near.gait, end.gait)
-    )
-    view = PersonView(walker.model, shown, near)
+    found, near = answer.found, answer.found.end.near
+    low, high = (100 * b for b in found.bracket)
     rows = [
         f"| {o.name} | {w:.3f} | {h:.3f} |"
-        for o, w, h in zip(spec.stack.objectives, end.w, answer.found.half, strict=True)
+        for o, w, h in zip(spec.stack.objectives, found.w, found.half, strict=True)
     ]
-    head = ["| objective | weight | half width |", "|---|---|---|"]
-    text = "\n".join([view.describe() + ".", "", *head, *rows, "", RESTS_ON[3:]])
-    record_motion(path, view, best, title=answer.name, text=text)
+    text = "\n".join(
+        [
+            f"The body comes within **{near.sagittal:.1f} degrees** of the recording at hips, "
+            f"knees and ankles. Such a walk costs **{low:.1f} to {high:.1f} %** more than the best "
+            "one for any weights. The weights that speak most for it:",
+            "",
+            "| objective | weight | half width |",
+            "|---|---|---|",
+            *rows,
+            "",
+            RESTS_ON[3:],
+        ]
+    )
+    record_explanation(path, spec, answer.person, found, text)
 
 
 def _forces(answer: Answer, spec: Any) -> str:
-    """How far vertical forces are from measured ones, which no weight has seen."""
+    """How far vertical forces are from measured ones, which the nearest gait was drawn to."""
     from walking_irl.run.walk_report import force_apart
 
     force = answer.person.force
@@ -222,20 +231,30 @@ def _forces(answer: Answer, spec: Any) -> str:
     )
 
 
+def _difference(a: Answer, b: Answer) -> tuple[Any, Any]:
+    """Difference of two people's weights, and its half widths."""
+    return a.found.w - b.found.w, np.hypot(a.found.half, b.found.half)
+
+
 def _compare(a: Answer, b: Answer, spec: Any, console: Console) -> None:
     """Which weights of two people differ beyond what is known."""
-    apart = a.found.w - b.found.w
-    known = np.hypot(a.found.half, b.found.half)
-    beyond = np.abs(apart) > known
+    apart, known = _difference(a, b)
     console.print(f"\n[bold]{escape(a.name)} against {escape(b.name)}[/bold]")
     table = Table("objective", "difference", "half width", "beyond it")
-    for o, d, h, is_real in zip(spec.stack.objectives, apart, known, beyond, strict=True):
-        table.add_row(o.name, f"{d:+.3f}", f"{h:.3f}", "yes" if is_real else "no")
+    names = [o.name for o in spec.stack.objectives]
+    beyond = np.abs(apart) > known
+    for name, d, h, is_real in zip(names, apart, known, beyond, strict=True):
+        table.add_row(name, f"{d:+.3f}", f"{h:.3f}", "yes" if is_real else "no")
     console.print(table)
+    differ = [n for n, is_real in zip(names, beyond, strict=True) if is_real]
+    console.print(
+        f"They differ in {', '.join(differ)}, beyond what is known."
+        if differ
+        else "They differ in no weight beyond what is known."
+    )
 
 
 def _to_json(answers: Sequence[Answer], spec: Any) -> dict[str, Any]:
-    from walking_irl.cli.read import to_json
     from walking_irl.run.walk_report import explanation_json
     from walking_irl.versions import versions
 
@@ -243,6 +262,16 @@ def _to_json(answers: Sequence[Answer], spec: Any) -> dict[str, Any]:
         "objectives": [o.name for o in spec.stack.objectives],
         "people": [
             {"read": to_json(a.person), **explanation_json(a.found, a.person.gait)} for a in answers
+        ],
+        "comparisons": [
+            {
+                "people": [a.name, b.name],
+                "difference": apart.tolist(),
+                "half_widths": known.tolist(),
+                "beyond": (np.abs(apart) > known).tolist(),
+            }
+            for a, b in combinations(answers, 2)
+            for apart, known in [_difference(a, b)]
         ],
         "versions": versions(),
     }

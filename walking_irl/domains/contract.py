@@ -20,6 +20,9 @@ from walking_irl.errors import InvalidInputError
 from walking_irl.types import Expert, Forward, Objective, Response
 
 EXPERTS = ("optimal", "suboptimal")
+INTERIOR = 0.05
+"""Share of even weights that methods without a least weight ask for where a vanishing weight leaves
+the optimum ill-defined."""
 
 OnStep = Callable[[int, float], None]
 """Told of every step of a solver: its number and the cost so far."""
@@ -43,6 +46,8 @@ class Defaults(NamedTuple):
     """Budget of forward solves, probes left aside; what is cheap to solve may be solved often."""
     min_weight: float = 0.0
     """The learner's lower bound of every weight."""
+    interior: float = 0.0
+    """Share of even weights in queries on the simplex's faces, where an optimum is ill-defined."""
     needs_workers: bool = False
     """Whether a forward solve takes longer than to start a process."""
     files: str = ""
@@ -104,6 +109,19 @@ class Demonstration:
     trajectories: tuple[Any, ...] = ()
 
 
+class Compared(NamedTuple):
+    """The optimal policy for some weights beside one that was shown, in the policy's parameters."""
+
+    residual: Array
+    """Shown minus optimal, shape (m,)."""
+    slope: Callable[[], Array]
+    """d optimal / d w, shape (m, K); asked for only by methods that use it."""
+    policy: Any
+    """The optimal policy."""
+    mu: Array
+    """Its feature expectations, shape (K,)."""
+
+
 @dataclass(frozen=True)
 class Learner:
     """A learner's tools; they know the expert's features, never its weights.
@@ -118,7 +136,17 @@ class Learner:
 
 
 class Domain(Protocol):
-    """A world with objectives, and a solver for the best policy under given weights."""
+    """A world with objectives, and a solver for the best policy under given weights.
+
+    Some methods of :mod:`walking_irl.baselines` ask for more, and run where it is offered:
+
+    - ``mdp``: the world as a finite MDP;
+    - ``policy_gradient(policy)``: gradient of each feature in the policy's parameters (p, K), along
+      the directions that its constraints leave;
+    - ``advantages(policy, *, size, rng)``: by how much the policy beats random deviations of a
+      relative size in each feature (n, K), and the state that each deviation belongs to (n,);
+    - ``nearest(policy)``: maps weights to their optimal policy beside that one, :class:`Compared`.
+    """
 
     @property
     def name(self) -> str:

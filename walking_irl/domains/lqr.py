@@ -7,19 +7,25 @@ section 7.2; closed form by one scalar Riccati equation per axis.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
 
-from walking_irl.arrays import Array
+from walking_irl.arrays import Array, Indices
+from walking_irl.domains.contract import Compared
 from walking_irl.domains.exact import ExactDomain
 from walking_irl.domains.weights import checked_weights
 from walking_irl.errors import SolverError
 from walking_irl.types import Expert, Objective, Response
 
+SAMPLED = (60, 30)
+"""States, and deviations at each, of :meth:`LQR.advantages`."""
 GAINS_OFF = 0.25
 """Relative error of a sub-optimal expert's gains."""
+PICTURE_STEPS = 16
+"""Of the trajectory that a picture shows."""
 
 
 class LQRPicture(NamedTuple):
@@ -113,6 +119,41 @@ class LQR(ExactDomain):
         noise = self.policy_noise * self.discount / (1 - self.discount)
         return -(self.start**2 + noise) * self._slopes(np.asarray(policy, dtype=np.float64)).T
 
+    def advantages(
+        self, policy: Array, *, size: float, rng: np.random.Generator
+    ) -> tuple[Array, Indices]:
+        """By how much u = k x beats u + size |x| xi in each objective, at random states x.
+
+        Args:
+            policy: Gains k, shape (K,).
+            size: Of the deviations, relative to the state.
+            rng: Draws states and deviations.
+
+        Returns:
+            Advantages (n, K), and the state that each belongs to (n,).
+        """
+        k, K, g = np.asarray(policy, dtype=np.float64), self.n_objectives, self.discount
+        Q, R = self._charges()
+        P = (Q + R * k**2) / (1 - g * (1 + k) ** 2)
+        states, rivals = SAMPLED
+        x = np.repeat(self.start * rng.standard_normal((states, K)), rivals, axis=0)
+        length = np.linalg.norm(x, axis=1, keepdims=True)
+        u = k * x + size * length * rng.standard_normal(x.shape)
+
+        def value(u: Array) -> Array:
+            return np.asarray(-(u**2 @ R.T + g * (x + u) ** 2 @ P.T))
+
+        return value(k * x) - value(u), np.repeat(np.arange(states), rivals)
+
+    def nearest(self, policy: Array) -> Callable[[Array], Compared]:
+        """Maps weights to their optimal gains beside the gains ``policy``, shape (K,)."""
+
+        def compared(w: Array) -> Compared:
+            k, slope = self._gains_and_slopes(checked_weights(w, self.n_objectives))
+            return Compared(policy - k, lambda: np.diag(slope), k, self.evaluate(k))
+
+        return compared
+
     def expert(self, w_E: Array, rng: np.random.Generator) -> Expert:
         """Exact features of the optimal gains, perturbed where ``perturbation`` > 0."""
         k = self.gains(checked_weights(w_E, self.n_objectives))
@@ -154,7 +195,7 @@ class LQR(ExactDomain):
             raise SolverError(f"the least regret was not found: {result.message}")
         return float(result.fun)
 
-    def picture(self, policy: Array, n_steps: int = 16) -> LQRPicture:
+    def picture(self, policy: Array, n_steps: int = PICTURE_STEPS) -> LQRPicture:
         """``n_steps`` steps under gains ``policy``, shape (K,)."""
         k = np.asarray(policy, dtype=np.float64)
         states = self.start * (1 + k) ** np.arange(n_steps + 1.0)[:, None]

@@ -10,12 +10,9 @@ import numpy as np
 
 from walking_irl.baselines.loop import Setting
 from walking_irl.domains import load
-from walking_irl.domains.contract import Demonstration, Learner, Request
+from walking_irl.domains.contract import INTERIOR, Demonstration, Learner, Request
 from walking_irl.errors import InvalidInputError
 from walking_irl.types import Expert, Forward
-
-FLOOR = 0.05
-"""Equal share of the baselines' queries where a vanishing weight leaves the optimum ill-defined."""
 
 
 @dataclass(frozen=True)
@@ -63,9 +60,9 @@ ARENAS = {
     "gridworld": Arena("sparse", is_finite=True),
     "driving": Arena(is_finite=True),
     "lqr": Arena(),
-    "walking-path": Arena("interior", floor=FLOOR),
-    "humanoid": Arena("typical", floor=FLOOR, is_slow=True),
-    "humanoid-planar": Arena("typical", floor=FLOOR, is_slow=True),
+    "walking-path": Arena("interior", floor=INTERIOR),
+    "humanoid": Arena("typical", floor=INTERIOR, is_slow=True),
+    "humanoid-planar": Arena("typical", floor=INTERIOR, is_slow=True),
 }
 
 

@@ -81,6 +81,11 @@ class ForwardJob:
         """The job as JSON types."""
         return {"kind": "forward method", **asdict(self)}
 
+    @property
+    def cost(self) -> float:
+        """Seconds that it takes, roughly: searches and gradients evaluate thousands of policies."""
+        return 0.0 if self.axes or "model" in METHODS[self.method].needs else 5.0
+
     def run(self) -> dict[str, Any]:
         """Loss, transitions, evaluations and seconds; or the error that ended it."""
         rng = np.random.default_rng([self.seed, 21])

@@ -13,13 +13,12 @@ import numpy as np
 
 from walking_irl.arrays import Array
 from walking_irl.baselines.girl import girl
-from walking_irl.baselines.ng_russell_2 import margin_program
 from walking_irl.baselines.registry import run_method
 from walking_irl.baselines.relative_entropy import reweight
 from walking_irl.domains.lqr import LQR
 from walking_irl.domains.path.walking_path import WalkingPath
 from walking_irl.errors import WalkingIRLError
-from walking_irl.experiments.forward_lqr import charges, episodes
+from walking_irl.experiments.forward_lqr import episodes
 from walking_irl.experiments.picture import Loss, loss_chart
 from walking_irl.experiments.runner import Runner
 from walking_irl.experiments.table import Table, machine
@@ -80,20 +79,10 @@ def _girl_from_episodes(n: int, domain: LQR, expert: Expert, rng: np.random.Gene
 
 
 def _ng_russell_2(h: float, domain: LQR, expert: Expert, rng: np.random.Generator) -> Found:
-    """Advantages of u = k x over u + h |x| xi in every feature, in closed form."""
-    k, g, K = expert.demonstration, domain.discount, domain.n_objectives
-    Q, R = charges(domain)
-    P = (Q + R * k**2) / (1 - g * (1 + k) ** 2)
-    x = np.repeat(domain.start * rng.standard_normal((60, K)), 30, axis=0)
-    size = np.linalg.norm(x, axis=1, keepdims=True)
-    u = k * x + h * size * rng.standard_normal(x.shape)
-
-    def value(u: Array) -> Array:
-        return np.asarray(-(u**2 @ R.T + g * (x + u) ** 2 @ P.T))
-
-    X = value(k * x) - value(u)
-    w, _ = margin_program(X / np.abs(X).max(), np.repeat(np.arange(60), 30), is_simplex=True)
-    return Found(w, 0)
+    """Advantages over inputs that are off by h |x|."""
+    found = run_method("ng-russell-2", domain, expert, rng=rng, size=h)
+    assert found.w is not None
+    return Found(found.w, 0)
 
 
 def _relative_entropy(n: int, domain: LQR, expert: Expert, rng: np.random.Generator) -> Found:
@@ -161,6 +150,11 @@ class ContinuousJob:
     def key(self) -> dict[str, Any]:
         """The job as JSON types."""
         return {"kind": "inverse method, continuous", **asdict(self)}
+
+    @property
+    def cost(self) -> float:
+        """Seconds that it takes, roughly."""
+        return 5.0 if self.world == "walking path" else 0.0
 
     def run(self) -> dict[str, Any]:
         """|dw|, forward solves and CPU seconds; or the error that ended it."""

@@ -123,6 +123,13 @@ class MethodJob:
         """The job as JSON types."""
         return {"kind": "inverse method", **asdict(self)}
 
+    @property
+    def cost(self) -> float:
+        """Seconds that it takes, roughly."""
+        if self.line in FEW.get(self.world, ()):
+            return 10.0
+        return 2.0 if self.line in THINNED.get(self.world, ()) else 0.0
+
     def run(self) -> dict[str, Any]:
         """Loss, correlation of rewards, CPU seconds and solves; or the error that ended it."""
         case = CASES[self.world](self.is_soft, self.n, self.seed)

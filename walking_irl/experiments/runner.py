@@ -41,7 +41,11 @@ def code_digest() -> str:
 
 
 class Job(Protocol):
-    """A picklable piece of work for one seed; equal jobs have equal results but for the clock."""
+    """A picklable piece of work for one seed; equal jobs have equal results but for the clock.
+
+    One that takes much longer than others of its table says so by ``cost``, in seconds as a rough
+    guess: the longest begin first, so that no core waits for them at the end.
+    """
 
     def key(self) -> dict[str, Any]:
         """What is done, as JSON types; no two kinds of jobs may have equal keys."""
@@ -121,7 +125,8 @@ class Runner:
     def _run(self, tasks: Sequence[Job], missing: Sequence[int]) -> Any:
         if self.executor is None:
             return ((i, run_job(tasks[i])) for i in missing)
-        futures = {self.executor.submit(run_job, tasks[i]): i for i in missing}
+        longest_first = sorted(missing, key=lambda i: -getattr(tasks[i], "cost", 0.0))
+        futures = {self.executor.submit(run_job, tasks[i]): i for i in longest_first}
         return ((futures[f], f.result()) for f in as_completed(futures))
 
     def _path(self, task: Job) -> Path | None:

@@ -12,7 +12,7 @@ import rerun.blueprint as rrb
 from walking_irl.recording import style
 from walking_irl.recording.experiment import Experiment
 from walking_irl.recording.interval_bars import BARS, bounds
-from walking_irl.recording.panels import Panel, panels
+from walking_irl.recording.panels import Panel, has_wide_view, panels
 from walking_irl.recording.progress_view import (
     FIGURES,
     FLOOR,
@@ -25,6 +25,8 @@ from walking_irl.recording.views.view import WorldView
 
 MOST_PLOTS = 4
 """Curves of a world that have a plot each."""
+MOST_ROWS = 7
+"""Rows of the text's table that are seen at once; for more, the lower part is higher."""
 
 
 def blueprint(experiment: Experiment, world: WorldView[Any] | None) -> rrb.Blueprint:
@@ -33,7 +35,8 @@ def blueprint(experiment: Experiment, world: WorldView[Any] | None) -> rrb.Bluep
     Curves of further points stand in the world's place where there is none, else in a tab.
     """
     shown = panels(experiment.names)
-    shadows = [_shadow(panel, len(shown), bool(experiment.others)) for panel in shown]
+    is_wide = has_wide_view(experiment, world is None)
+    shadows = [shadow_view(panel, len(shown), is_wide) for panel in shown]
     curves = _others(experiment)
     beside = [rrb.Vertical(*curves)] if curves else []
     left: list[rrb.View | rrb.Container] = [world.view()] if world is not None else [*beside]
@@ -42,7 +45,7 @@ def blueprint(experiment: Experiment, world: WorldView[Any] | None) -> rrb.Bluep
     top = [*left, *right]
     bottom = rrb.Horizontal(
         rrb.Tabs(
-            _bars(experiment),
+            bars_view(experiment),
             _history(experiment),
             *([] if world is None else curves),
             active_tab=0,
@@ -51,27 +54,29 @@ def blueprint(experiment: Experiment, world: WorldView[Any] | None) -> rrb.Bluep
         rrb.Tabs(
             rrb.TextDocumentView(origin="/summary", name="What to look at"),
             rrb.TextLogView(origin="/log", name="Log"),
-            _plots("Features", [f"/{feature_path(name)}" for name in experiment.names]),
-            *([] if world is None else [_each(world.curves_name, world.curves())]),
+            plot_view("Features", [f"/{feature_path(name)}" for name in experiment.names]),
+            *([] if world is None else [plot_views(world.curves_name, world.curves())]),
             active_tab=0,
         ),
         column_shares=[1.15, 1.0, 1.0],
     )
     columns = ([1.0] if left else []) + ([share] if right else [])
     rows = [rrb.Horizontal(*top, column_shares=columns), bottom] if top else [bottom]
-    return _window(rrb.Vertical(*rows, row_shares=[1.75, 1.0][: len(rows)]))
+    upper = 1.75 if len(experiment.names) <= MOST_ROWS else 1.2
+    return window(rrb.Vertical(*rows, row_shares=[upper, 1.0][: len(rows)]))
 
 
 def motion_blueprint(world: WorldView[Any], plots: Mapping[str, Sequence[str]]) -> rrb.Blueprint:
     """One motion alone: the world, and beside it the text, further plots and the joints."""
     text = rrb.TextDocumentView(origin="/summary", name="Summary")
-    further = [_plots(name, list(curves)) for name, curves in plots.items()]
-    curves = [*further, _plots(world.curves_name, world.curves())]
+    further = [plot_view(name, list(curves)) for name, curves in plots.items()]
+    curves = [*further, plot_view(world.curves_name, world.curves())]
     side = rrb.Vertical(text, *curves, row_shares=[1.3, *(1.0 for _ in curves)])
-    return _window(rrb.Horizontal(world.view(), side, column_shares=[1.7, 1.0]))
+    return window(rrb.Horizontal(world.view(), side, column_shares=[1.7, 1.0]))
 
 
-def _window(content: rrb.Container) -> rrb.Blueprint:
+def window(content: rrb.Container) -> rrb.Blueprint:
+    """A blueprint that plays at once and shows nothing but ``content``."""
     return rrb.Blueprint(
         content,
         rrb.TimePanel(
@@ -84,7 +89,8 @@ def _window(content: rrb.Container) -> rrb.Blueprint:
     )
 
 
-def _shadow(panel: Panel, n_panels: int, is_wide: bool) -> rrb.View:
+def shadow_view(panel: Panel, n_panels: int, is_wide: bool) -> rrb.View:
+    """A panel of the polyhedron, seen so that it fills its view."""
     position, target = (2.45, 1.6, 0.62), (0.3, 0.3, -0.03)
     if panel.is_flat:
         position, target = (0.92, 0.43, 1.85), (0.92, 0.43, 0.0)
@@ -106,11 +112,12 @@ def _shadow(panel: Panel, n_panels: int, is_wide: bool) -> rrb.View:
     )
 
 
-def _bars(experiment: Experiment) -> rrb.View:
-    x_range, y_range = bounds(len(experiment.objectives))
+def bars_view(experiment: Experiment, name: str = "Intervals of the weights") -> rrb.View:
+    """The intervals of all weights."""
+    x_range, y_range = bounds(experiment.names)
     return rrb.Spatial2DView(
         origin=f"/{BARS}",
-        name="Intervals of the weights",
+        name=name,
         background=style.PAPER,
         visual_bounds=rrb.VisualBounds2D(x_range=x_range, y_range=y_range),
     )
@@ -144,7 +151,8 @@ def _certificate(experiment: Experiment) -> rrb.View:
     )
 
 
-def _plots(name: str, curves: list[str]) -> rrb.View:
+def plot_view(name: str, curves: list[str]) -> rrb.View:
+    """Curves over the whole run."""
     return rrb.TimeSeriesView(
         origin="/",
         contents=curves,
@@ -155,11 +163,12 @@ def _plots(name: str, curves: list[str]) -> rrb.View:
     )
 
 
-def _each(name: str, curves: list[str]) -> rrb.View | rrb.Container:
+def plot_views(name: str, curves: list[str]) -> rrb.View | rrb.Container:
     """A plot a curve, which shows learner and expert; many share one."""
     if len(curves) > MOST_PLOTS:
-        return _plots(name, curves)
-    return rrb.Vertical(*(_plots(curve.rsplit("/", 1)[-1], [curve]) for curve in curves), name=name)
+        return plot_view(name, curves)
+    shown = [plot_view(curve.rsplit("/", 1)[-1], [curve]) for curve in curves]
+    return rrb.Vertical(*shown, name=name)
 
 
 def _others(experiment: Experiment) -> list[rrb.View]:
@@ -179,7 +188,7 @@ def _others(experiment: Experiment) -> list[rrb.View]:
     ]
     if experiment.w_expert is not None:
         paths = [f"/{distance_path(name)}" for name in experiment.others]
-        views.insert(0, _plots("Distance to the ground-truth weights (log10, L1)", paths))
+        views.insert(0, plot_view("Distance to the ground-truth weights (log10, L1)", paths))
     return views
 
 

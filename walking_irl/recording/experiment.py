@@ -39,6 +39,8 @@ class Experiment:
         seed: Seed of the experiment, or None.
         truth: Ground-truth weights and noise-free features where they are known; for pictures only.
         question: What the run answers, as the summary's title; "" for a general one.
+        answer: What the run found, as Markdown, where the weights are not the loop's own; "" for a
+            text about the loop's.
         others: Names of further points, at most 4, that every iteration shows in the query's place.
     """
 
@@ -50,6 +52,7 @@ class Experiment:
     seed: int | None = None
     truth: Truth | None = None
     question: str = ""
+    answer: str = ""
     others: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:

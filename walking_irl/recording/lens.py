@@ -11,7 +11,6 @@ import rerun as rr
 from walking_irl.arrays import Array
 from walking_irl.recording import style
 from walking_irl.recording.drawing import text_3d
-from walking_irl.recording.hulls import Hull
 from walking_irl.recording.panels import Panel
 
 LENS_RADIUS = 0.32
@@ -57,10 +56,10 @@ def pictures(panel: Panel, lens: Lens | None) -> list[tuple[str, Lens | None]]:
     return true_scale if lens is None else [*true_scale, (f"{panel.path}/lens", lens)]
 
 
-def lens_of(panel: Panel, before: Hull, is_wide: bool) -> Lens | None:
-    """A lens about the set, or None while that fills much of the frame by itself."""
-    focus = (before.points.max(axis=0) + before.points.min(axis=0)) / 2
-    extent = float(np.abs(before.points - focus).max())
+def lens_of(panel: Panel, points: Array, is_wide: bool) -> Lens | None:
+    """A lens about points (n, 3) of the panel, or None while they fill much of the frame."""
+    focus = (points.max(axis=0) + points.min(axis=0)) / 2
+    extent = float(np.abs(points - focus).max())
     zoom = magnification(extent)
     if zoom < 2.0:
         return None

@@ -20,9 +20,9 @@ from walking_irl.errors import EmptyPolyhedronError
 from walking_irl.recording import style
 from walking_irl.recording.drawing import text_3d
 from walking_irl.recording.experiment import Clock, Experiment, Other
-from walking_irl.recording.hulls import CREASE, Hull, faces_lost, hull
+from walking_irl.recording.hulls import CREASE, Hull, faces_lost, hull, polygon_lost
 from walking_irl.recording.lens import LENS_RADIUS, Lens, lens_of, log_lens, pictures
-from walking_irl.recording.panels import Panel, panels
+from walking_irl.recording.panels import Panel, has_wide_view, panels
 from walking_irl.types import Iteration
 
 CLEAR_EDGES, MOST_EDGES = 40, 90
@@ -38,7 +38,7 @@ KEY_SOLID = ((0.95, -0.18, 0.95), (0.0, 0.0, -0.14))
 """Where the first name of further points stands, and from there the next one."""
 
 
-class _Point(NamedTuple):
+class Point(NamedTuple):
     """A point among the weights: a dot, or lines about it, which hide nothing behind them."""
 
     name: str
@@ -61,10 +61,16 @@ LINE = 1.5
 
 
 class PolyhedronView:
-    """Logs the polyhedron of each iteration in every panel."""
+    """Logs the polyhedron of each iteration in every panel.
 
-    def __init__(self, experiment: Experiment) -> None:
+    Args:
+        experiment: What is known before the run.
+        is_alone: Whether no world stands beside it.
+    """
+
+    def __init__(self, experiment: Experiment, *, is_alone: bool = False) -> None:
         self.panels = panels(experiment.names)
+        self._is_wide = has_wide_view(experiment, is_alone)
         self._w_expert = experiment.w_expert
         self._others = experiment.others
         self._density = THIN if experiment.others else 1.0
@@ -73,7 +79,7 @@ class PolyhedronView:
     def log_static(self, stream: rr.RecordingStream) -> None:
         """Log frames, names and styles."""
         for panel in self.panels:
-            _log_frame(stream, panel)
+            log_frame(stream, panel)
             if self._others and len(self.panels) == 1:
                 _log_key(stream, panel, self._others)
 
@@ -103,16 +109,16 @@ class PolyhedronView:
             for root in (panel.path, f"{panel.path}/lens"):
                 stream.log(f"{root}/query", rr.Clear(recursive=False))
 
-    def _points(self, it: Iteration, others: Sequence[Other]) -> list[_Point]:
+    def _points(self, it: Iteration, others: Sequence[Other]) -> list[Point]:
         points = [
-            _Point("query", it.w, style.LEARNER, 4.0),
-            _Point("estimate", it.estimate, style.ESTIMATE, lines=DIAMOND),
+            Point("query", it.w, style.LEARNER, 4.0),
+            Point("estimate", it.estimate, style.ESTIMATE, lines=DIAMOND),
         ]
         if self._others:
             shown = zip(self._others, others, style.OTHERS, strict=False)
-            points = [_Point(other_path(name), o.w, colour, 5.5) for name, o, colour in shown]
+            points = [Point(other_path(name), o.w, colour, 5.5) for name, o, colour in shown]
         if self._w_expert is not None:
-            points.append(_Point("truth", self._w_expert, style.EXPERT, lines=CROSS))
+            points.append(Point("truth", self._w_expert, style.EXPERT, lines=CROSS))
         return points
 
     def _log_panel(
@@ -120,12 +126,12 @@ class PolyhedronView:
         stream: rr.RecordingStream,
         clock: Clock,
         panel: Panel,
-        points: Sequence[_Point],
+        points: Sequence[Point],
         before: Hull,
         after: Hull,
     ) -> None:
         clock.set(stream)
-        lens = lens_of(panel, before, is_wide=bool(self._others) and len(self.panels) == 1)
+        lens = lens_of(panel, before.points, self._is_wide)
         if lens is None:
             stream.log(f"{panel.path}/lens", rr.Clear(recursive=True))
         else:
@@ -139,7 +145,7 @@ class PolyhedronView:
                     np.abs(see(x) - see.place).max() <= LENS_RADIUS * 1.001
                 )
                 at = x if see is None else see(x)
-                _log_point(stream, root, point, at + lifted, is_seen)
+                log_point(stream, root, point, at + lifted, is_seen)
         self._fade(stream, clock, panel, before, after, lens)
 
     def _fade(
@@ -151,12 +157,14 @@ class PolyhedronView:
         after: Hull,
         lens: Lens | None,
     ) -> None:
-        faces = faces_lost(before, after) if not panel.is_flat else before.triangles
+        points, faces = before.points, faces_lost(before, after)
+        if panel.is_flat:
+            points, faces = polygon_lost(before, after)
         if len(faces) == 0:
             return
         edges = _edges_lost(before, after)
         for root, see in pictures(panel, lens):
-            at, strips = before.points, edges
+            at, strips = points, edges
             if see is not None:
                 at, strips = see(at), see(strips)
             stream.log(f"{root}/cut", _mesh(at, faces, style.CUT, self._density * CUT_ALPHA))
@@ -178,7 +186,8 @@ class PolyhedronView:
             clock.set(stream)
 
 
-def _log_frame(stream: rr.RecordingStream, panel: Panel) -> None:
+def log_frame(stream: rr.RecordingStream, panel: Panel) -> None:
+    """Log the corners of a panel and their names."""
     stream.log(panel.path, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     sides = np.array(list(combinations(panel.corners, 2)))
     lines = rr.LineStrips3D(sides, colors=[style.FRAME], radii=rr.Radius.ui_points([1.0]))
@@ -229,9 +238,8 @@ def _longest(edges: Array) -> Array:
     return chosen
 
 
-def _log_point(
-    stream: rr.RecordingStream, root: str, point: _Point, x: Array, is_seen: bool
-) -> None:
+def log_point(stream: rr.RecordingStream, root: str, point: Point, x: Array, is_seen: bool) -> None:
+    """Log a point at ``x`` of a picture, or nothing where it lies outside of a lens."""
     shape: rr.Points3D | rr.LineStrips3D
     if point.lines is None:
         radii = rr.Radius.ui_points([point.size])

@@ -117,8 +117,8 @@ class Recording:
 
 
 SINGLE = (
-    *("domain", "centre", "mode", "seed", "iterations", "ending", "status", "certificate"),
-    *("rule", "how_sure", "volume_ratio", "condition_number", "weakest", "gauge"),
+    *("domain", "method", "loss", "centre", "mode", "seed", "iterations", "ending", "status"),
+    *("certificate", "rule", "how_sure", "volume_ratio", "condition_number", "weakest", "gauge"),
 )
 """Properties that are one value."""
 
@@ -132,7 +132,8 @@ def inspect_recording(path: str | Path) -> dict[str, Any]:
     """What a recording holds, ready for JSON.
 
     Returns:
-        application_id, domain, objectives, units, centre, mode, seed, w_expert (or None), w, rule,
+        application_id, domain, method (of ``recover --method``), loss (of its policy, relative),
+        objectives, units, centre, mode, seed, w_expert (or None), w, rule,
         intervals (K, 2), physical_intervals (K, 2), status, ending (None for a whole run),
         certificate, bracket, how_sure, half widths by cause (from_noise, from_gap, from_solver;
         (K,) each), volume_ratio, condition_number, weakest, gauge, noise, iterations,
@@ -144,10 +145,10 @@ def inspect_recording(path: str | Path) -> dict[str, Any]:
     recording = Recording(path)
     known = recording.properties
     pairs = {key: known.get(key) for key in ("intervals", "physical_intervals")}
-    keys = ("domain", "objectives", "units", "centre", "mode", "seed", "w_expert", "w", "rule",
-            "status", "ending", "certificate", "bracket", "how_sure", "from_noise", "from_gap",
-            "from_solver", "volume_ratio", "condition_number", "weakest", "gauge", "noise",
-            "iterations")  # fmt: skip
+    keys = ("domain", "method", "loss", "objectives", "units", "centre", "mode", "seed",
+            "w_expert", "w", "rule", "status", "ending", "certificate", "bracket", "how_sure",
+            "from_noise", "from_gap", "from_solver", "volume_ratio", "condition_number",
+            "weakest", "gauge", "noise", "iterations")  # fmt: skip
     return {
         "application_id": APPLICATION_ID,
         **{key: known.get(key) for key in keys},
@@ -174,7 +175,7 @@ def _check_file(path: Path) -> Path:
     if not path.exists():
         raise RecordingError(f"there is no recording {path}; check the name")
     if not path.is_file():
-        raise RecordingError(f"expected a recording file, {path} is a folder or a device")
+        raise RecordingError(f"expected a recording file, {path} is a folder, a pipe or a device")
     try:
         with path.open("rb") as file:
             start = file.read(len(MAGIC))

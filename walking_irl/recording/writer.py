@@ -4,52 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
-from typing import Generic, Self, TypeVar
-
-import rerun as rr
+from typing import Any, Generic, TypeVar
 
 from walking_irl.cpirl.summary import summarise
 from walking_irl.errors import RecordingError
-from walking_irl.files import check_writable, write_file
+from walking_irl.files import check_writable
 from walking_irl.recording.blueprint import blueprint, motion_blueprint
 from walking_irl.recording.experiment import Clock, Experiment, Other
 from walking_irl.recording.polyhedron_view import PolyhedronView
 from walking_irl.recording.progress_view import ProgressView
-from walking_irl.recording.reader import APPLICATION_ID
+from walking_irl.recording.stream import RecordingFile, open_stream, save_stream
 from walking_irl.recording.style import PLAYBACK_RATE
 from walking_irl.recording.summary import motion_properties, properties, summary
 from walking_irl.recording.views.view import WorldView
 from walking_irl.types import Iteration
-from walking_irl.workers import interrupts_held
 
-FLUSH_SECONDS = 60.0
 FRAMES_WITHOUT_WORLD = round(1.5 * PLAYBACK_RATE)
 
 Motion = TypeVar("Motion")
 
 
-def open_stream() -> tuple[rr.RecordingStream, rr.MemoryRecording]:
-    """A stream whose content stays in memory and does not depend on the clock.
-
-    Raises:
-        RecordingError: If Rerun is disabled.
-    """
-    stream = rr.RecordingStream(
-        APPLICATION_ID, send_properties=False, batcher_config=rr.ChunkBatcherConfig.NEVER()
-    )
-    if not stream.is_enabled():
-        raise RecordingError(
-            "cannot record: Rerun is disabled by the environment variable RERUN; unset it"
-        )
-    stream.set_log_time_enabled(False)
-    return stream, stream.memory_recording()
-
-
-class Recorder(Generic[Motion]):
-    """Context manager that keeps a recording in memory and writes it when the block ends.
-
-    Also after an exception or Ctrl-C: the file then holds what was done until then and says so.
+class Recorder(RecordingFile, Generic[Motion]):
+    """Context manager that records a run of CPIRL, iteration by iteration.
 
     Args:
         path: The ``.rrd`` file; whether it can be written is checked now.
@@ -66,24 +42,21 @@ class Recorder(Generic[Motion]):
         experiment: Experiment,
         world: WorldView[Motion] | None = None,
     ) -> None:
-        self.path = check_writable(path, RecordingError)
+        super().__init__(path)
         self.experiment = experiment
         self.world = world
-        self._polyhedron = PolyhedronView(experiment)
+        self._polyhedron = PolyhedronView(experiment, is_alone=world is None)
         self._progress = ProgressView(experiment)
         self._iterations: list[Iteration] = []
         self._n_frames = 0
 
-    def __enter__(self) -> Self:
-        self._stream, self._memory = open_stream()
+    def _begin(self) -> None:
         self._stream.send_blueprint(blueprint(self.experiment, self.world))
-        self._stream.send_recording_name(_title(self.experiment))
+        self._stream.send_recording_name(title_of(self.experiment))
         if self.world is not None:
             self.world.log_static(self._stream)
         self._polyhedron.log_static(self._stream)
         self._progress.log_static(self._stream)
-        self._stream.flush(timeout_sec=FLUSH_SECONDS)
-        return self
 
     def iteration(
         self, it: Iteration, motion: Motion | None = None, others: Sequence[Other] = ()
@@ -113,39 +86,20 @@ class Recorder(Generic[Motion]):
         self._polyhedron.log_answer(self._stream, clock)
         self._play(clock, motion, is_last=True)
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        ending = None if kind is None else _ending(kind)
-        try:
-            with interrupts_held():  # a second Ctrl-C, or one at the very end
-                self._save(ending)
-        except RecordingError as failure:
-            if error is None:
-                raise
-            error.add_note(str(failure))  # the first error matters more
-
     def _play(self, clock: Clock, motion: Motion | None, is_last: bool) -> None:
         n_frames = FRAMES_WITHOUT_WORLD
         if self.world is not None and motion is not None:
             n_frames = self.world.log_iteration(self._stream, clock, motion, is_last)
         self._n_frames = clock.first + n_frames
 
-    def _save(self, ending: str | None) -> None:
+    def _end(self, ending: str | None) -> tuple[str, dict[str, Any]]:
         world = "" if self.world is None else self.world.describe()
         e, found = self.experiment, None
         if self._iterations:
+            end = Clock(self._n_frames - 1, self._iterations[-1].k)
+            self._progress.log_end(self._stream, end)
             found = summarise(self._iterations, e.expert, e.objectives)
-        text = summary(e, found, world, ending)
-        markdown = rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)
-        self._stream.log("summary", markdown, static=True)
-        values = rr.AnyValues(**properties(e, found, ending))
-        self._stream.send_property("experiment", values)
-        self._stream.flush(timeout_sec=FLUSH_SECONDS)  # once: every chunk costs a kilobyte
-        write_file(self.path, self._memory.drain_as_bytes(), RecordingError)
+        return summary(e, found, world, ending), properties(e, found, ending)
 
 
 def record_motion(
@@ -178,18 +132,12 @@ def record_motion(
     stream.send_recording_name(title)
     world.log_static(stream)
     world.log_iteration(stream, Clock(0, 0), motion, True)
-    markdown = rr.TextDocument(f"# {title}\n\n{text}", media_type=rr.MediaType.MARKDOWN)
-    stream.log("summary", markdown, static=True)
-    stream.send_property("experiment", rr.AnyValues(**motion_properties(title, weights or {})))
-    stream.flush(timeout_sec=FLUSH_SECONDS)
-    write_file(target, memory.drain_as_bytes(), RecordingError)
+    known = motion_properties(title, weights or {})
+    save_stream(stream, memory, target, f"# {title}\n\n{text}", known)
     return target
 
 
-def _title(experiment: Experiment) -> str:
+def title_of(experiment: Experiment) -> str:
+    """Name of a recording."""
     seed = "" if experiment.seed is None else f", seed {experiment.seed}"
     return f"{experiment.domain}{seed}"
-
-
-def _ending(kind: type[BaseException]) -> str:
-    return "interrupted" if kind is KeyboardInterrupt else kind.__name__

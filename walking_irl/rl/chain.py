@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy import sparse
-from scipy.linalg import lu_factor, lu_solve
+from scipy.linalg.lapack import dgetrf, dgetrs
 from scipy.sparse.linalg import splu
 
 from walking_irl.arrays import Array
-from walking_irl.rl.finite_mdp import Actions, FiniteMDP
+
+if TYPE_CHECKING:  # a world evaluates its policies with this
+    from walking_irl.rl.finite_mdp import Actions, FiniteMDP
 
 DENSE_STATES = 300
 """Up to here a dense factorisation is faster: a sparse one of 256 states takes seven times as
@@ -26,37 +28,50 @@ class Chain:
     """
 
     def __init__(self, mdp: FiniteMDP, policy: Array | Actions) -> None:
-        S, A = mdp.n_states, mdp.n_actions
+        S = mdp.n_states
         self._lu: Any = None
-        if S <= DENSE_STATES:
-            T = mdp.dense
-            if policy.ndim == 1:
-                rows = T[policy.astype(np.intp), np.arange(S)]
-            else:
-                rows = np.einsum("sa,ast->st", policy, T)
-            self._dense = lu_factor(np.eye(S) - mdp.discount * rows, check_finite=False)
+        if S > DENSE_STATES:
+            self._lu = splu((sparse.eye_array(S) - mdp.discount * _sparse(mdp, policy)).tocsc())
             return
-        P, T = mdp.probabilities(policy), sparse.csr_array(mdp.T)
-        entries = np.diff(T.indptr)
-        state = np.repeat(np.tile(np.arange(S), A), entries)
-        values = np.repeat(P.T.ravel(), entries) * T.data
-        chain = sparse.csc_array((values, (state, T.indices)), shape=(S, S))
-        self._lu = splu((sparse.eye_array(S) - mdp.discount * chain).tocsc())
+        matrix = _dense(mdp, policy)
+        matrix *= -mdp.discount
+        matrix.reshape(-1)[:: S + 1] += 1.0
+        # Its rows are the columns that LAPACK wants: the transposed matrix is factorised in place.
+        self._factors, self._pivots, _ = dgetrf(matrix.T, overwrite_a=1)
 
     def solve(self, b: Array) -> Array:
         """The x with (I - gamma T_pi) x = b; b has shape (S,) or (S, n)."""
-        x: Array
         if self._lu is not None:
-            x = self._lu.solve(b)
-        else:
-            x = lu_solve(self._dense, b, check_finite=False)
-        return x
+            x: Array = self._lu.solve(b)
+            return x
+        return self._substituted(b, 1)
 
     def solve_transposed(self, b: Array) -> Array:
         """The x with (I - gamma T_pi)' x = b; for b = start the discounted visits."""
-        x: Array
         if self._lu is not None:
-            x = self._lu.solve(b, trans="T")
-        else:
-            x = lu_solve(self._dense, b, trans=1, check_finite=False)
-        return x
+            x: Array = self._lu.solve(b, trans="T")
+            return x
+        return self._substituted(b, 0)
+
+    def _substituted(self, b: Array, trans: int) -> Array:
+        x, _ = dgetrs(self._factors, self._pivots, b, trans=trans)
+        return np.ascontiguousarray(x)
+
+
+def _dense(mdp: FiniteMDP, policy: Array | Actions) -> Array:
+    """T_pi as a new array, shape (S, S)."""
+    S = mdp.n_states
+    if policy.ndim == 1:
+        rows: Array = mdp.dense[policy.astype(np.intp), np.arange(S)]
+        return rows
+    entry, state, action, value = mdp.entries
+    chain: Array = np.bincount(entry, policy[state, action] * value, S * S).reshape(S, S)  # type: ignore[assignment]
+    return chain
+
+
+def _sparse(mdp: FiniteMDP, policy: Array | Actions) -> Any:
+    """T_pi as a sparse matrix, shape (S, S)."""
+    S = mdp.n_states
+    entry, state, action, value = mdp.entries
+    values = mdp.probabilities(policy)[state, action] * value
+    return sparse.csc_array((values, (state, entry % S)), shape=(S, S))

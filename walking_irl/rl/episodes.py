@@ -13,6 +13,7 @@ import numpy as np
 
 from walking_irl.arrays import Array
 from walking_irl.errors import InvalidInputError
+from walking_irl.rl.chain import Chain
 from walking_irl.rl.finite_mdp import FiniteMDP
 from walking_irl.rl.generative import next_states
 
@@ -105,8 +106,8 @@ def softmax_gradient(mdp: FiniteMDP, psi: Array, theta: Array) -> Array:
     Q_k the action values of feature k (Sutton, McAllester, Singh & Mansour 2000, theorem 1).
     """
     policy = softmax_policy(psi, theta)
-    lu = mdp.system(policy)
-    x, Psi = lu.solve(mdp.start, trans="T"), lu.solve(mdp.Phi)
+    chain = Chain(mdp, policy)
+    x, Psi = chain.solve_transposed(mdp.start), chain.solve(mdp.Phi)
     after = (mdp.T @ Psi).reshape(mdp.n_actions, mdp.n_states, -1)
     Q = mdp.Phi[None] + mdp.discount * after  # (A, S, K)
     centred = psi - np.einsum("sa,sap->sp", policy, psi)[:, None]

@@ -13,13 +13,23 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse.linalg import splu
 
 from walking_irl.arrays import Array
 from walking_irl.errors import InvalidInputError
+from walking_irl.rl.chain import Chain
 
 Actions = NDArray[np.intp]
 """A deterministic policy: one action per state, shape (S,)."""
+
+
+class Entries(NamedTuple):
+    """Non-zero transition probabilities, n of them, each array of shape (n,)."""
+
+    place: NDArray[np.intp]
+    """s S + s', the place in a matrix of states by next states."""
+    state: NDArray[np.intp]
+    action: NDArray[np.intp]
+    value: Array
 
 
 class Solution(NamedTuple):
@@ -88,6 +98,13 @@ class FiniteMDP:
         T: Array = self.T.toarray().reshape(self.n_actions, self.n_states, self.n_states)
         return T
 
+    @cached_property
+    def entries(self) -> Entries:
+        """The non-zero entries of T."""
+        T = sparse.coo_array(self.T)
+        state = T.row % self.n_states
+        return Entries(state * self.n_states + T.col, state, T.row // self.n_states, T.data)
+
     def reward(self, w: Array) -> Array:
         """r(s) = w.phi(s), shape (S,); any finite weights (K,), negative ones included."""
         w = np.asarray(w, dtype=float)
@@ -100,23 +117,9 @@ class FiniteMDP:
         q: Array = r + self.discount * (self.T @ V).reshape(self.n_actions, self.n_states)
         return q
 
-    def system(self, policy: Array | Actions) -> Any:
-        """Sparse LU of I - gamma T_pi, for a deterministic (S,) or stochastic (S, A) policy."""
-        matrix = sparse.eye_array(self.n_states) - self.discount * self._chain(policy)
-        return splu(matrix.tocsc())
-
-    def _chain(self, policy: Array | Actions) -> Any:
-        """Transition matrix under a policy, shape (S, S)."""
-        S = self.n_states
-        if policy.ndim == 1:
-            return self.T[policy.astype(np.intp) * S + np.arange(S)]
-        blocks = [sparse.diags_array(policy[:, a]) for a in range(self.n_actions)]
-        return sparse.hstack(blocks).tocsr() @ self.T
-
     def visits(self, policy: Array | Actions) -> Array:
         """Discounted expected visits of each state, shape (S,); they sum to 1 / (1 - gamma)."""
-        x: Array = self.system(policy).solve(self.start, trans="T")
-        return x
+        return Chain(self, policy).solve_transposed(self.start)
 
     def feature_expectations(self, policy: Array | Actions) -> Array:
         """Exact mu = Phi' (I - gamma T_pi)'^-1 start, shape (K,)."""
@@ -138,8 +141,13 @@ class FiniteMDP:
             The policy, shape (S, A), and its feature expectations, shape (K,).
         """
         x = np.zeros((self.n_states, self.n_actions))
+        seen: dict[bytes, Array] = {}  # many lotteries hold a policy several times
         for policy, p in zip(policies, mixture, strict=True):
-            x += p * self.visits(policy)[:, None] * self.probabilities(policy)
+            key = policy.tobytes()
+            if key not in seen and p > 0:
+                seen[key] = self.visits(policy)[:, None] * self.probabilities(policy)
+            if p > 0:
+                x += p * seen[key]
         pi = normalised_occupancy(x)
         return pi, self.feature_expectations(pi)
 

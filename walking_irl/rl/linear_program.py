@@ -9,6 +9,7 @@ from scipy import sparse
 
 from walking_irl.arrays import Array
 from walking_irl.errors import SolverError
+from walking_irl.rl.chain import Chain
 from walking_irl.rl.finite_mdp import FiniteMDP, Solution
 
 
@@ -50,6 +51,6 @@ def linear_program(mdp: FiniteMDP, w: Array) -> Solution:
     V = -result.eqlin.marginals  # multipliers of the flow: the values of visited states
     greedy = mdp.action_values(r, V).argmax(axis=0)
     pi = np.where(x.sum(axis=0) > 1e-9, x.argmax(axis=0), greedy)
-    lu = mdp.system(pi)
-    mu = mdp.Phi.T @ lu.solve(mdp.start, trans="T")
-    return Solution(pi, lu.solve(r), mu, int(result.nit))
+    chain = Chain(mdp, pi)
+    mu = mdp.Phi.T @ chain.solve_transposed(mdp.start)
+    return Solution(pi, chain.solve(r), mu, int(result.nit))

@@ -6,6 +6,7 @@ import numpy as np
 
 from walking_irl.arrays import Array
 from walking_irl.errors import SolverError
+from walking_irl.rl.chain import Chain
 from walking_irl.rl.finite_mdp import Actions, FiniteMDP, Solution
 
 TIE = 1e-10
@@ -29,13 +30,13 @@ def policy_iteration(
     r, states = mdp.reward(w), np.arange(mdp.n_states)
     pi = np.zeros(mdp.n_states, dtype=np.intp) if pi is None else pi.copy()
     for n_iter in range(1, max_iter + 1):
-        lu = mdp.system(pi)
-        V = lu.solve(r)
+        chain = Chain(mdp, pi)
+        V = chain.solve(r)
         Q = mdp.action_values(r, V)
         margin = TIE * max(1.0, float(np.abs(V).max()))
         is_better = Q.max(axis=0) > Q[pi, states] + margin
         if not is_better.any():
-            mu = mdp.Phi.T @ lu.solve(mdp.start, trans="T")
+            mu = mdp.Phi.T @ chain.solve_transposed(mdp.start)
             return Solution(pi, V, mu, n_iter)
         pi = np.where(is_better, Q.argmax(axis=0), pi)
     raise SolverError(f"policy iteration still changes the policy after {max_iter} improvements")

@@ -24,6 +24,8 @@ class Optimum(NamedTuple):
     """Action of each state, shape (S,)."""
     V: Array
     """Value of each state, shape (S,)."""
+    chain: Chain
+    """The policy's linear systems: its visits cost one more substitution."""
 
 
 def checked_reward(mdp: FiniteMDP, reward: Array) -> Array:
@@ -87,12 +89,13 @@ def best_policy(mdp: FiniteMDP, reward: Array, *, pi: Actions | None = None) -> 
             V = mdp.action_values(R, V).max(axis=0)
         pi = mdp.action_values(R, V).argmax(axis=0)
     for _ in range(MAX_IMPROVEMENTS):
-        V = Chain(mdp, pi).solve(R[pi, states])
+        chain = Chain(mdp, pi)
+        V = chain.solve(R[pi, states])
         Q = mdp.action_values(R, V)
         margin = TIE * max(1.0, float(np.abs(V).max()))
         is_better = Q.max(axis=0) > Q[pi, states] + margin
         if not is_better.any():
-            return Optimum(pi, V)
+            return Optimum(pi, V, chain)
         pi = np.where(is_better, Q.argmax(axis=0), pi)
     raise SolverError(
         f"policy iteration still changes the policy after {MAX_IMPROVEMENTS} improvements"

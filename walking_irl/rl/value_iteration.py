@@ -6,6 +6,7 @@ import numpy as np
 
 from walking_irl.arrays import Array
 from walking_irl.errors import InvalidInputError, SolverError
+from walking_irl.rl.chain import Chain
 from walking_irl.rl.finite_mdp import FiniteMDP, Solution
 
 
@@ -39,7 +40,7 @@ def value_iteration(
         V = V_next
         if change <= bound:
             pi = mdp.action_values(r, V).argmax(axis=0)
-            lu = mdp.system(pi)
-            mu = mdp.Phi.T @ lu.solve(mdp.start, trans="T")
-            return Solution(pi, lu.solve(r), mu, n_iter)
+            chain = Chain(mdp, pi)
+            mu = mdp.Phi.T @ chain.solve_transposed(mdp.start)
+            return Solution(pi, chain.solve(r), mu, n_iter)
     raise SolverError(f"value iteration still moves by {change:.1e} after {max_iter} sweeps")

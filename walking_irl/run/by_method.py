@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from walking_irl.arrays import Array
+from walking_irl.baselines.given import HOOKS
 from walking_irl.baselines.recovered import Recovered
 from walking_irl.baselines.registry import FINITE, METHODS, Method, Needs, run_method
 from walking_irl.domains import load
@@ -21,6 +22,7 @@ from walking_irl.rl.finite_mdp import FiniteMDP
 from walking_irl.run.problem import Problem, prepare
 from walking_irl.run.setup import HORIZON, TRAJECTORIES, Setup
 from walking_irl.types import Expert
+from walking_irl.versions import versions
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,7 @@ class MethodReport:
     found: Recovered
     n_trajectories: int
     seconds: float
+    recording: str | None = None
 
     @property
     def weights(self) -> Array | None:
@@ -48,14 +51,26 @@ class MethodReport:
         w = self.found.w
         if w is None or not np.abs(w).sum() > 0 or len(w) != len(self.problem.objectives):
             return None
-        scaled: Array = w / np.abs(w).sum()
-        return scaled
+        return scaled(w)
+
+    @property
+    def samples(self) -> Array | None:
+        """Samples of a posterior (m, K), scaled likewise, where the method draws some."""
+        if self.found.samples is None:
+            return None
+        samples = scaled(self.found.samples)
+        known: Array = samples[np.isfinite(samples).all(axis=1)]
+        return known if len(known) else None
 
     @property
     def intervals(self) -> Array | None:
-        """95 % intervals of the weights on the simplex, (K, 2), where the method has them."""
+        """95 % intervals of the weights scaled so, (K, 2), where the method has them."""
         found = self.found.info.get("intervals")
-        return np.asarray(found) if found is not None and self.found.space == "simplex" else None
+        if found is not None and self.found.space == "simplex":
+            return np.asarray(found)
+        if self.samples is None:
+            return None
+        return np.asarray(np.quantile(self.samples, [0.025, 0.975], axis=0).T)
 
     @property
     def relative_loss(self) -> float | None:
@@ -82,8 +97,19 @@ class MethodReport:
             "forward_solves": self.found.info.get("solves"),
             "status": self.found.status.value,
             "notes": list(self.found.notes),
+            "objective": self.found.objective.tolist(),
+            "reward": None if self.found.reward is None else self.found.reward.tolist(),
             "seconds": self.seconds,
+            "recording": self.recording,
+            "versions": versions(),
         }
+
+
+def scaled(w: Array) -> Array:
+    """Weights (..., K) with sum |w| = 1, whose scale says nothing; not a number where all are 0."""
+    with np.errstate(invalid="ignore"):
+        shares: Array = w / np.abs(w).sum(axis=-1, keepdims=True)
+    return shares
 
 
 def recover_by(
@@ -139,9 +165,10 @@ def _check(
             f"{method.name} needs finitely many states and actions with a known model, "
             f"{domain.name} has not"
         )
-    if method.needs is Needs.GRADIENT and not hasattr(domain, "policy_gradient"):
+    is_asked = mdp is None or FINITE not in method.worlds
+    if method.hook and is_asked and not hasattr(domain, method.hook):
         raise InvalidInputError(
-            f"{method.name} needs the gradient of policies with parameters, {domain.name} has none"
+            f"{method.name} needs {HOOKS[method.hook]}; {domain.name} offers none"
         )
     if n_trajectories is None:
         return mdp
@@ -161,7 +188,7 @@ def _world(problem: Problem) -> Any:
     domain = problem.domain
     if isinstance(getattr(domain, "mdp", None), FiniteMDP):
         return domain
-    offered = {"name": domain.name, "forward": problem.learner.forward}
-    if hasattr(domain, "policy_gradient"):
-        offered["policy_gradient"] = domain.policy_gradient
-    return SimpleNamespace(**offered)
+    hooks = {hook: getattr(domain, hook) for hook in HOOKS if hasattr(domain, hook)}
+    return SimpleNamespace(
+        name=domain.name, forward=problem.learner.forward, defaults=domain.defaults, **hooks
+    )

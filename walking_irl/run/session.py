@@ -130,7 +130,7 @@ def _learn(
                     recorded.show(it)
         if recorded is not None:
             with watch.part("recording"):
-                recorded.finale(_nearest(report))
+                recorded.finale(report.iterations, report.w)
 
 
 def _timed(problem: Problem, watch: Stopwatch, executor: Executor | None) -> Iterator[Iteration]:
@@ -171,8 +171,3 @@ def _keep(report: Report, file: CheckpointFile, n_known: int) -> None:
         report.checkpoint = str(file.path)
     except InvalidInputError as error:
         report.failed_write, report.checkpoint = error, None
-
-
-def _nearest(report: Report) -> Iteration:
-    """The query nearest to the recovered weights."""
-    return min(report.iterations, key=lambda it: float(np.abs(it.w - report.w).sum()))

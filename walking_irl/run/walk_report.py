@@ -50,7 +50,7 @@ def explanation_json(found: Explanation, shown: Gait) -> dict[str, Any]:
         "w": found.w.tolist(),
         "half_widths": found.half.tolist(),
         "intervals": found.intervals.tolist(),
-        "from_slack": found.allowed.tolist(),
+        "from_walk": found.allowed.tolist(),
         "from_starts": found.starts.tolist(),
         "from_trials": found.trials.tolist(),
         "gap": end.gap,

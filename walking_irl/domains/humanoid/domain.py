@@ -10,8 +10,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from walking_irl.arrays import Array
+from walking_irl.arrays import Array, Indices
 from walking_irl.domains.contract import (
+    INTERIOR,
     Defaults,
     Demonstration,
     Learner,
@@ -30,6 +31,11 @@ from walking_irl.domains.humanoid.costs.defaults import DEFAULT_COSTS, Costs
 from walking_irl.domains.humanoid.demonstrations import demonstrated
 from walking_irl.domains.humanoid.expert_search import OptimalGait, best_gait
 from walking_irl.domains.humanoid.gait.gait import Gait, cycle_motion
+from walking_irl.domains.humanoid.inverse_optimal_control import (
+    NearestGait,
+    nearby_costs,
+    stationarity,
+)
 from walking_irl.domains.humanoid.learner import WarmStartSolver, search, solver_for, warm_up
 from walking_irl.domains.humanoid.optimiser.solver import Solution
 from walking_irl.domains.humanoid.optimiser.stages import stage
@@ -38,12 +44,15 @@ from walking_irl.domains.humanoid.population import POPULATIONS
 from walking_irl.domains.humanoid.spec import WalkerSpec
 from walking_irl.errors import SolverError
 from walking_irl.expert import expert_from_returns
+from walking_irl.rl.constraints import free_gradient
 from walking_irl.types import Expert, Objective, Response, Rollout
 
 THREADS = 2
 """Threads of one learner's solve: solves follow one another, so the cores would idle."""
 MIN_WEIGHT = 0.005
 """The learner's lower bound of every weight; the gait of a vanishing weight is ill-defined."""
+N_NEARBY = 40
+"""Other gaits that a gait is compared with."""
 SUBOPTIMAL_BY = np.deg2rad(1.0)
 """First amplitude of the perturbation that makes a gait worse [rad]."""
 WORSE = (0.01, 0.10)
@@ -102,7 +111,7 @@ class Humanoid:
     """
 
     options: Mapping[str, Option] = OPTIONS
-    defaults = Defaults(20, MIN_WEIGHT, needs_workers=True, files="walking")
+    defaults = Defaults(20, MIN_WEIGHT, INTERIOR, needs_workers=True, files="walking")
     view: str | None = "walker"
     has_trajectories = True
 
@@ -221,6 +230,24 @@ class Humanoid:
             return Learner(forward)
         trials = trials_of(settings(self.options, options, self.name))
         return Learner(forward, Remeasure(self.spec, trials, rng, executor))
+
+    def policy_gradient(self, policy: Gait) -> Array:
+        """Gradient of each objective in a gait, along what the root forces leave free, (n, K)."""
+        return -free_gradient(*stationarity(self.spec, policy))
+
+    def advantages(
+        self, policy: Gait, *, size: float, rng: np.random.Generator
+    ) -> tuple[Array, Indices]:
+        """By how much a gait beats others near it in each objective, (n, K).
+
+        They lie where gaits of weights would that are off by ``size``. All belong to one state.
+        """
+        X = nearby_costs(self.spec, policy, size, N_NEARBY, rng)
+        return X, np.zeros(len(X), dtype=np.intp)
+
+    def nearest(self, policy: Gait) -> NearestGait:
+        """Maps weights to their best gait beside the joint angles of ``policy``."""
+        return NearestGait(self.spec, policy)
 
     def picture(self, policy: Gait) -> Cycle:
         """A gait's whole cycle."""

@@ -5,12 +5,12 @@ These methods see a gait, not its features: joint angles at the knots, as motion
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from walking_irl.arrays import Array
+from walking_irl.domains.contract import Compared
 from walking_irl.domains.humanoid.costs.base import Channels
 from walking_irl.domains.humanoid.gait.gait import Gait, cycle_motion
 from walking_irl.domains.humanoid.learner import solver_for
@@ -19,6 +19,7 @@ from walking_irl.domains.humanoid.optimiser.linearisation import Linearisation
 from walking_irl.domains.humanoid.optimiser.solver import Solution
 from walking_irl.domains.humanoid.optimiser.stages import DIRECT
 from walking_irl.domains.humanoid.spec import WalkerSpec
+from walking_irl.errors import SolverError
 
 
 class Stationarity(NamedTuple):
@@ -30,16 +31,8 @@ class Stationarity(NamedTuple):
     """Gradient of each root force, in its units: (N n_root, N nv + 2)."""
 
 
-class NearGait(NamedTuple):
-    """The optimal gait for some weights, compared with joint angles that were shown."""
-
-    residual: Array
-    """Joint angles shown minus optimal, without what a later start explains, (N nu,) [rad]."""
-    slope: Callable[[], Array]
-    """d angles / d w, shape (N nu, K) [rad]."""
-    policy: Gait
-    mu: Array
-    """Its feature expectations, shape (K,)."""
+MAX_DRAWS, MAX_NEWTON = 4, 4
+"""Draws of a gait near by for each that is wanted, and steps that make one physical."""
 
 
 def stationarity(spec: WalkerSpec, gait: Gait) -> Stationarity:
@@ -60,11 +53,49 @@ def root_jacobian(lin: Linearisation) -> Array:
     return np.array(rows)
 
 
+def nearby_costs(
+    spec: WalkerSpec, gait: Gait, size: float, n: int, rng: np.random.Generator
+) -> Array:
+    """Costs of ``n`` physical gaits near one less its own, shape (n, K).
+
+    They lie where gaits of other weights would, to first order and with Gauss-Newton's Hessian at
+    even weights: random directions would be told apart by their stiffest cost alone. Newton steps
+    then take away what the curvature of the constraints leaves.
+
+    Args:
+        spec: Which body, and its costs.
+        gait: A gait; it is made physical first where it is not.
+        size: Standard deviation of the change of a weight.
+        n: Number of gaits.
+        rng: Draws them.
+
+    Raises:
+        SolverError: If hardly any gait so near is physical.
+    """
+    solver, K = solver_for(spec), len(spec.stack.objectives)
+    x = solver.physical(gait.to_vector())
+    lin = solver.linearise(x)
+    J, towards = root_jacobian(lin), solver.rough_slope(np.full(K, 1 / K), lin)
+    back, found = np.linalg.pinv(J), []
+    own = lin.evaluation.total_costs()
+    for change in size * rng.standard_normal((MAX_DRAWS * n, K)):
+        step = towards @ (change - change.mean())
+        near = x + step - back @ (J @ step)
+        for _ in range(MAX_NEWTON):
+            near = near - back @ solver.problem.evaluate(near).root.ravel()
+        if solver.dual(near) is not None:
+            found.append(solver.problem.evaluate(near).total_costs() - own)
+        if len(found) == n:
+            return np.array(found)
+    raise SolverError(f"of {MAX_DRAWS * n} gaits near by only {len(found)} are physical")
+
+
 class NearestGait:
     """The forward problem of bilevel methods: the optimal gait, next to the joint angles shown.
 
-    Every solve starts from the demonstration, made physical; where its answer is not the nearest
-    so far, once more from the nearest gait so far, and the cheaper answer counts.
+    The residual holds joint angles shown minus optimal, without what a later start explains, shape
+    (N nu,) [rad]. Every solve starts from the demonstration, made physical; where its answer is not
+    the nearest so far, once more from the nearest gait so far, and the cheaper answer counts.
 
     Args:
         spec: Which body, and its costs.
@@ -86,7 +117,7 @@ class NearestGait:
         """Joint angles at the knots, shape (N, nu) [rad]."""
         return gait.q[:, self.spec.walker.n_root :]
 
-    def __call__(self, w: Array) -> NearGait:
+    def __call__(self, w: Array) -> Compared:
         """The optimal gait for weights ``w``, shape (K,)."""
         found = self._solve(w, self.start)
         near = self._compare(w, found)
@@ -104,7 +135,7 @@ class NearestGait:
         solver = solver_for(self.spec)
         return solver.solve(w, x, DIRECT, root=solver.dual(x))
 
-    def _compare(self, w: Array, found: Solution) -> NearGait:
+    def _compare(self, w: Array, found: Solution) -> Compared:
         nv, walker = len(self.spec.walker.joints), self.spec.walker
         gait = Gait.from_vector(found.x, nv)
         later = cycle_motion(gait, walker.mirror)[1][: gait.n_knots, walker.n_root :].ravel()
@@ -121,4 +152,4 @@ class NearestGait:
 
         away = np.zeros_like(found.x)
         away[:-2].reshape(-1, nv)[:, walker.n_root :] = self.shown - self.angles(gait)
-        return NearGait(angles(away), slope, gait, -found.total_costs)
+        return Compared(angles(away), slope, gait, -found.total_costs)

@@ -91,12 +91,15 @@ class Driving(FiniteDomain):
             "driving", OBJECTIVES, FiniteMDP(_transitions(), Phi, start, DISCOUNT), method
         )
 
-    def picture(self, policy: Actions, n_steps: int = 40, seed: int = 0) -> DrivingPicture:
-        """A drive of ``n_steps`` under a policy, shape (S,); lanes are drawn from ``seed``."""
+    def picture(self, policy: Array | Actions, n_steps: int = 40, seed: int = 0) -> DrivingPicture:
+        """A drive of ``n_steps`` under a policy, (S,) or (S, A); ``seed`` draws lanes, actions."""
         rng = np.random.default_rng(seed)
         state, states = 0, []
         for _ in range(n_steps):
-            row = self.mdp.T[[int(policy[state]) * self.mdp.n_states + state]]
+            action = policy[state]
+            if policy.ndim == 2:
+                action = rng.choice(self.mdp.n_actions, p=action)
+            row = self.mdp.T[[int(action) * self.mdp.n_states + state]]
             state = int(rng.choice(row.indices, p=row.data))
             states.append(state)
         speed, x, lane, row = _grid()[:, np.array(states) - 1]

@@ -30,7 +30,7 @@ class GridPicture(NamedTuple):
     """What a viewer needs to draw a policy of the gridworld; row 0 is at the top."""
 
     arrows: Array
-    """(row, column) step of the action chosen in each cell, shape (size, size, 2)."""
+    """Mean (row, column) step of the actions in each cell, shape (size, size, 2)."""
     visits: Array
     """Discounted expected visits of each cell, shape (size, size)."""
     regions: Indices
@@ -90,10 +90,10 @@ class Gridworld(FiniteDomain):
             if np.count_nonzero(w) >= 2:
                 return np.asarray(w / w.sum())
 
-    def picture(self, policy: Actions) -> GridPicture:
-        """Arrows, visits and regions of a policy, shape (S,)."""
+    def picture(self, policy: Array | Actions) -> GridPicture:
+        """Arrows, visits and regions of a policy, (S,) or (S, A)."""
         shape = (self.size, self.size)
-        arrows = MOVES[policy].astype(float).reshape(*shape, 2)
+        arrows = (self.mdp.probabilities(policy) @ MOVES).reshape(*shape, 2)
         return GridPicture(arrows, self.mdp.visits(policy).reshape(shape), self.regions)
 
 

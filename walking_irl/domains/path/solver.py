@@ -23,6 +23,8 @@ RESIDUAL, STATIONARITY = 1e-10, 1e-8
 """Tolerances of a solution: final state; gradient, relative to the objective's weights."""
 AT_BOUND = 1e-7
 MAX_NEWTON = 8
+MAX_DRAWS = 20
+"""Draws of other ways to a goal."""
 
 
 class Path(NamedTuple):
@@ -55,6 +57,51 @@ def reduced_gradient(z: Array, goal: Array) -> Array:
     free = _free(z)
     gradient: Array = (J[:, free] @ null_space(E[:, free])).T
     return gradient
+
+
+def nearby_paths(z: Array, goal: Array, size: float, n: int, rng: np.random.Generator) -> Array:
+    """Costs of ``n`` other ways to the goal, shape (n, 5): random steps that keep the end.
+
+    A step along the null space of the end conditions has the length ``size`` relative to z;
+    Newton's method then leads back to the end, and what does not arrive is drawn again.
+
+    Raises:
+        SolverError: If hardly any of them arrives.
+    """
+    free, found = _free(z), np.empty((0, N_COSTS))
+    E = jacobians(z, goal)[3][:, free]
+    along, back = null_space(E), np.linalg.pinv(E)
+    target, lo, hi = np.concatenate([goal, np.zeros(3)]), *_bounds(z.size)
+    for _ in range(MAX_DRAWS):
+        steps = rng.standard_normal((n, along.shape[1])) @ along.T
+        steps *= size * np.linalg.norm(z) / np.linalg.norm(steps, axis=1, keepdims=True)
+        near = np.repeat(z[None], n, axis=0)
+        near[:, free] += steps
+        for _ in range(MAX_NEWTON):
+            near[:, free] -= (integrate(near).end - target) @ back.T
+            near = np.clip(near, lo, hi)
+        walks = integrate(near)
+        arrives = np.abs(walks.end - target).max(axis=1) <= RESIDUAL
+        found = np.concatenate([found, costs(walks, goal)[arrives]])
+        if len(found) >= n:
+            return found[:n]
+    raise SolverError(f"of other ways to {goal.tolist()} only {len(found)} of {n} arrive")
+
+
+def slope(path: Path, goal: Array, a: Array) -> Array:
+    """D z / d a of an optimal path, shape (3 N + 1, 5): -Z (Z' H Z)^-1 Z' J'.
+
+    Controls at their bounds stay there.
+    """
+    free = _free(path.z)
+    _, _, J, E = jacobians(path.z, goal)
+    g, E = a @ J, E[:, free]
+    multipliers = -np.asarray(np.linalg.lstsq(E.T, g[free], rcond=None)[0], dtype=np.float64)
+    Z = null_space(E)
+    H = hessian(path.z, goal, a, multipliers)[np.ix_(free, free)]
+    change = np.zeros((path.z.size, N_COSTS))
+    change[free] = -Z @ np.linalg.solve(Z.T @ H @ Z, Z.T @ J[:, free].T)
+    return change
 
 
 def _free(z: Array) -> NDArray[np.bool_]:

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from walking_irl.arrays import Array
-from walking_irl.domains.contract import Defaults, Option
+from walking_irl.arrays import Array, Indices
+from walking_irl.domains.contract import INTERIOR, Compared, Defaults, Option
 from walking_irl.domains.exact import ExactDomain
 from walking_irl.domains.path.model import costs, integrate
 from walking_irl.domains.path.solver import (
     Path,
     bent_start,
+    nearby_paths,
     polished,
     reduced_gradient,
+    slope,
     slsqp_path,
     straight_start,
 )
@@ -34,6 +36,8 @@ REACH = (0.5, 20.0)
 """Distances of goals [m] that count as a walk: psi is undefined nearer, T is bounded further."""
 COARSE = 1e-6
 """Tolerance of SLSQP from which Newton's method takes over."""
+N_NEARBY = 60
+"""Other paths to each goal that a path is compared with."""
 PERTURBATION = 0.25
 """Relative spread of a sub-optimal expert's weights from goal to goal (as for the LQR)."""
 OPTIONS = {
@@ -84,7 +88,7 @@ class WalkingPath(ExactDomain):
     name = "walking-path"
     objectives: tuple[Objective, ...] = OBJECTIVES
     options = OPTIONS
-    defaults = Defaults(needs_workers=True)
+    defaults = Defaults(interior=INTERIOR, needs_workers=True)
     view = "walking-path"
 
     def __init__(
@@ -135,6 +139,50 @@ class WalkingPath(ExactDomain):
         parts = [reduced_gradient(p.z, goal) for p, goal in zip(policy, self.goals, strict=True)]
         G: Array = -np.concatenate(parts) / (len(parts) * SCALES)
         return G
+
+    def advantages(
+        self, policy: tuple[Path, ...], *, size: float, rng: np.random.Generator
+    ) -> tuple[Array, Indices]:
+        """By how much each path beats others to its goal in each objective.
+
+        Args:
+            policy: A path for each goal.
+            size: Relative change of controls and duration.
+            rng: Draws the changes.
+
+        Returns:
+            Advantages (n, 5), and the goal that each belongs to (n,).
+        """
+        parts = [
+            (nearby_paths(p.z, goal, size, N_NEARBY, rng) - p.F) / SCALES
+            for p, goal in zip(policy, self.goals, strict=True)
+        ]
+        return np.concatenate(parts), np.repeat(np.arange(len(parts)), N_NEARBY)
+
+    def nearest(self, policy: tuple[Path, ...]) -> Callable[[Array], Compared]:
+        """Maps weights to their best paths beside the paths ``policy``, in controls and duration.
+
+        Raises:
+            InvalidInputError: If the paths have another number of controls than this domain's.
+        """
+        shown = self.pack(policy)
+        if shown.shape[1] != 3 * self.n_intervals + 1:
+            raise InvalidInputError(
+                f"paths must have {self.n_intervals} intervals, got {shown.shape[1]} parameters"
+            )
+
+        def compared(w: Array) -> Compared:
+            response = self.forward(w)
+            paths, a = response.policy, checked_weights(w, len(SCALES)) / SCALES
+
+            def slopes() -> Array:
+                parts = [slope(p, goal, a) for p, goal in zip(paths, self.goals, strict=True)]
+                return np.asarray(np.concatenate(parts) / SCALES)
+
+            residual = (shown - self.pack(paths)).ravel()
+            return Compared(residual, slopes, paths, response.mu)
+
+        return compared
 
     def suboptimal_expert(self, w_E: Array, rng: np.random.Generator) -> Expert:
         """Expert whose weights differ from goal to goal: no single weights explain it."""

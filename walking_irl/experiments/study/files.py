@@ -32,6 +32,8 @@ NOTES = (
     "--expert-gap 0 does.",
     "CPU seconds are those of one process, its expert included; machines differ.",
 )
+NOTHING = "n/a"
+"""A figure of no values."""
 
 
 def write_study(result: Result, folder: Path) -> list[Path]:
@@ -55,10 +57,10 @@ def study_command(result: Result) -> str:
 
 
 def figures(result: Result) -> list[tuple[str, str]]:
-    """The main figures, in words."""
+    """The main figures, in words; those that this study has."""
     n_inside, experts = int(result.scored.inside.all(axis=1).sum()), in_words(result.experts_inside)
     spread = {name: _spread(values) for name, values in result.spreads.items()}
-    return [
+    lines = [
         ("experts with every weight inside", f"{n_inside} of {result.n}: {experts}"),
         ("weights inside", in_words(result.weights_inside)),
         ("truths beyond half of the half width", in_words(result.beyond_half)),
@@ -66,6 +68,7 @@ def figures(result: Result) -> list[tuple[str, str]]:
         ("runs that end with an answer", in_words(result.successes)),
         *((f"{name}: median, 90 %, largest", text) for name, text in spread.items()),
     ]
+    return [(name, text) for name, text in lines if text != NOTHING]
 
 
 def in_words(share: Share) -> str:
@@ -75,7 +78,7 @@ def in_words(share: Share) -> str:
     '97.0 % (91.5 - 99.4)'
     """
     if share.value != share.value:
-        return "n/a"
+        return NOTHING
     return f"{100 * share.value:.1f} % ({100 * share.low:.1f} - {100 * share.high:.1f})"
 
 
@@ -153,7 +156,7 @@ def to_json(result: Result) -> dict[str, Any]:
 
 
 def _spread(values: Sequence[float]) -> str:
-    return ", ".join(f"{v:.3g}" for v in values) if values else "n/a"
+    return ", ".join(f"{v:.3g}" for v in values) if values else NOTHING
 
 
 def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:

@@ -152,7 +152,7 @@ class Result:
         found = {title: quantiles(self._column(name)) for title, name in named}
         whole = {"half width of a weight": quantiles(self._half_widths.ravel())}
         parts = {f"of it {what}": quantiles(self._part(name)) for name, what in CAUSES.items()}
-        return {**whole, **parts, **found}
+        return {**whole, **{what: told for what, told in parts.items() if told}, **found}
 
     @property
     def endings(self) -> list[tuple[str, int, str]]:

@@ -130,7 +130,7 @@ class DrivingView:
         """One sentence for the summary."""
         also = " beside the expert's (**red** car)" if self.expert is not None else ""
         return (
-            f"a drive of the best policy for the weights queried (**blue** car){also}; the same "
+            f"a drive of the learner's policy (**blue** car){also}; the same "
             "lanes are drawn for both, a car that collides turns **orange**, green is off the road"
         )
 

@@ -37,12 +37,20 @@ class WalkerView:
     Learner and ghost start every iteration side by side and in the same phase, and then walk at
     their own pace: what differs is what can be seen. The learner never jumps in x.
 
+    Attributes:
+        names: Of learner and ghost.
+        title: Of the view with both.
+        eye: Where the camera is, and what it looks at [m].
+
     Args:
         model: The body; ``nq == nv`` and its first joint is x.
         expert: The expert's walk, or None where there is no ghost to show.
     """
 
     curves_name = "Joints [deg]"
+    names = ("learner", "expert")
+    title = "Walking: learner, and the expert as a red ghost"
+    eye = ((2.0, -1.6, 1.2), (0.0, 0.4, 0.84))
 
     def __init__(self, model: mujoco.MjModel, expert: Rollout | None = None) -> None:
         self.model = model
@@ -69,10 +77,10 @@ class WalkerView:
                 colour = style.OTHERS[MAIN_JOINTS.index(name)]
                 lines = rr.SeriesLines(names=[name], colors=[colour], widths=[2.0])
             if self.expert is not None:
-                names = [f"{name} learner", f"{name} expert"]
+                names = [f"{name} {who}" for who in self.names]
                 lines = rr.SeriesLines(names=names, colors=[style.LEARNER, style.EXPERT])
             stream.log(_joint_path(name), lines, static=True)
-        names = ["walker"] if self.expert is None else ["learner", "expert"]
+        names = ["walker"] if self.expert is None else list(self.names)
         colours = [style.LEARNER, style.EXPERT][: len(names)]
         for path in (SPEED, FORCE):
             stream.log(path, rr.SeriesLines(names=names, colors=colours), static=True)
@@ -105,7 +113,7 @@ class WalkerView:
         self._x += distance(motion, n)
         return n
 
-    def view(self) -> rrb.View:
+    def view(self) -> rrb.View | rrb.Container:
         """The camera walks along."""
         since = rrb.VisibleTimeRange(
             "frame",
@@ -115,9 +123,7 @@ class WalkerView:
         return rrb.Spatial3DView(
             origin="/world/follow",
             contents=["/world/**"],
-            name="Walking"
-            if self.expert is None
-            else "Walking: learner, and the expert as a red ghost",
+            name="Walking" if self.expert is None else self.title,
             background=style.PAPER,
             line_grid=rrb.LineGrid3D(
                 visible=True,
@@ -126,7 +132,7 @@ class WalkerView:
                 plane=rr.components.Plane3D.XY,
             ),
             eye_controls=rrb.EyeControls3D(
-                position=(2.0, -1.6, 1.2), look_target=(0.0, 0.4, 0.84), eye_up=(0, 0, 1)
+                position=self.eye[0], look_target=self.eye[1], eye_up=(0, 0, 1)
             ),
             overrides={"/world/com_trail": [rrb.VisibleTimeRanges([since])]},
         )
@@ -146,7 +152,7 @@ class WalkerView:
         """One sentence for the summary."""
         ghost = " with the expert as a **red ghost**" if self.expert is not None else ""
         return (
-            f"the best gait for the weights queried{ghost}; they start each iteration together, "
+            f"the learner's gait{ghost}; they start each iteration together, "
             "and orange arrows are ground reaction forces"
         )
 

@@ -129,7 +129,7 @@ class PathView:
         """One sentence for the summary."""
         also = ", in red the expert's" if self.expert is not None else ""
         return (
-            f"the best paths for the weights queried (**blue**{also}), from the start to every "
+            f"the learner's paths (**blue**{also}), from the start to every "
             f"goal at once, {PACE:g} times as fast as in life and in the end at life's pace; "
             f"arrows along a path show the heading every {TICK_SECONDS:g} s"
         )

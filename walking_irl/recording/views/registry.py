@@ -9,6 +9,7 @@ import numpy as np
 
 from walking_irl.arrays import Array
 from walking_irl.domains.contract import Demonstration
+from walking_irl.recording.panels import panels
 from walking_irl.recording.views.view import WorldView
 
 
@@ -16,8 +17,9 @@ class World(NamedTuple):
     """A view, and what it is shown."""
 
     view: WorldView[Any]
-    motion: Callable[[Any, Array], Any]
-    """Maps a policy, and the weights that it is the best for, to what the view shows of it."""
+    motion: Callable[..., Any]
+    """Maps a policy, the weights that it is the best for (or None), and the reward of each state
+    (where it is not that of the weights) to what the view shows of it."""
 
 
 def world_of(domain: Any, shown: Demonstration | None = None) -> World | None:
@@ -35,7 +37,7 @@ def _walker(domain: Any, shown: Demonstration | None) -> World:
     from walking_irl.recording.views.gait import WalkerView
     from walking_irl.recording.views.motion import periodic_rollout
 
-    def motion(policy: Any, w: Array | None = None) -> Any:
+    def motion(policy: Any, w: Array | None = None, reward: Array | None = None) -> Any:
         return periodic_rollout(*domain.picture(policy))
 
     ghost = None if shown is None else motion(shown.policy)
@@ -43,22 +45,45 @@ def _walker(domain: Any, shown: Demonstration | None) -> World:
 
 
 def _gridworld(domain: Any, shown: Demonstration | None) -> World:
+    from walking_irl.recording.views.gridworld import Landmarks
+
+    cells = [np.argwhere(domain.regions == j)[:, ::-1] for j in range(len(domain.objectives))]
+    regions = np.array([[at.min(axis=0), at.max(axis=0) + 1] for at in cells], float)
+    return _grid("Gridworld", domain, shown, Landmarks(regions=regions))
+
+
+def _objectworld(domain: Any, shown: Demonstration | None) -> World:
+    from walking_irl.recording.views.gridworld import Landmarks
+
+    found = domain.objects
+    rows, columns = np.divmod(found.cells, domain.size)
+    at = np.c_[columns, rows] + 0.5
+    return _grid("Objectworld", domain, shown, Landmarks(np.empty((0, 2, 2)), at, *found[1:]))
+
+
+def _grid(title: str, domain: Any, shown: Demonstration | None, landmarks: Any) -> World:
     from walking_irl.recording.views.gridworld import GridMotion, GridworldView
 
-    def motion(policy: Any, w: Array) -> GridMotion:
-        return GridMotion(domain.picture(policy), w)
+    def motion(policy: Any, w: Array | None = None, reward: Array | None = None) -> GridMotion:
+        if reward is None and w is not None:
+            reward = domain.mdp.reward(w)
+        picture, shape = domain.picture(policy), (domain.size, domain.size)
+        seen = None if reward is None else np.reshape(reward, shape)
+        return GridMotion(picture.arrows, picture.visits, seen)
 
     expert = None
     if shown is not None and shown.truth is not None:
         expert = motion(shown.policy, shown.truth.w)
-    return World(GridworldView(domain.size, expert), motion)
+    is_square = bool(panels([o.name for o in domain.objectives]))  # these stand beside it
+    return World(GridworldView(title, domain.size, landmarks, expert, is_square=is_square), motion)
 
 
 def _lqr(domain: Any, shown: Demonstration | None) -> World:
+    from walking_irl.domains.lqr import PICTURE_STEPS
     from walking_irl.recording.views.lqr import LQRView
 
     names = [o.name for o in domain.objectives]
-    return World(LQRView(names, _picture(domain, shown)), _motion(domain))
+    return World(LQRView(names, PICTURE_STEPS, _picture(domain, shown)), _motion(domain))
 
 
 def _walking_path(domain: Any, shown: Demonstration | None) -> World:
@@ -78,13 +103,14 @@ def _picture(domain: Any, shown: Demonstration | None) -> Any:
     return None if shown is None else domain.picture(shown.policy)
 
 
-def _motion(domain: Any) -> Callable[[Any, Array], Any]:
-    return lambda policy, w: domain.picture(policy)
+def _motion(domain: Any) -> Callable[..., Any]:
+    return lambda policy, w=None, reward=None: domain.picture(policy)
 
 
 VIEWS: dict[str | None, Callable[[Any, Demonstration | None], World]] = {
     "walker": _walker,
     "gridworld": _gridworld,
+    "objectworld": _objectworld,
     "lqr": _lqr,
     "walking-path": _walking_path,
     "driving": _driving,

@@ -31,7 +31,7 @@ class WorldView(Protocol[Motion_contra]):
         """Play a motion from ``clock`` on, longer for the last one; returns the frames used."""
         ...
 
-    def view(self) -> rrb.View:
+    def view(self) -> rrb.View | rrb.Container:
         """The view of this world in the blueprint."""
         ...
 

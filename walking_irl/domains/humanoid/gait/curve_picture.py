@@ -88,7 +88,7 @@ def _panel(
     norm = norms.curves.get(variable)
     known = [c for c in curves if c is not None]
     band = [] if norm is None else [norm.mean - norm.sd, norm.mean + norm.sd]
-    low, high = _range([*known, *band])
+    low, high = limits([*known, *band])
     left, top = x0 + LEFT, y0 + TOP
     width, height = WIDTH - LEFT - RIGHT, HEIGHT - TOP - BOTTOM
 
@@ -103,7 +103,7 @@ def _panel(
         edge = at(PHASES, band[1]) + at(PHASES[::-1], band[0][::-1])
         out.append(f'<polygon points="{_points(edge)}" fill="{BAND}"/>')
         out.append(_path(at(PHASES, norm.mean), "#a8a8a8", 1.2))
-    for value in _ticks(low, high):
+    for value in ticks(low, high):
         y = top + height * (high - value) / (high - low)
         out.append(_line(left, y, left + width, y, "#bbbbbb" if value == 0 else FAINT))
         out.append(_text(left - 6, y + 4, f"{value:g}", "end", colour=GREY))
@@ -118,14 +118,14 @@ def _panel(
     return out
 
 
-def _range(curves: Sequence[Array]) -> tuple[float, float]:
-    """Limits of an axis that holds all curves."""
+def limits(curves: Sequence[Array]) -> tuple[float, float]:
+    """Limits of an axis that holds all curves, with a margin."""
     low, high = float(min(c.min() for c in curves)), float(max(c.max() for c in curves))
     margin = 0.06 * max(high - low, 1e-9)
     return low - margin, high + margin
 
 
-def _ticks(low: float, high: float) -> list[float]:
+def ticks(low: float, high: float) -> list[float]:
     """Round numbers within an axis, four or so."""
     step = 10.0 ** np.floor(np.log10((high - low) / 3))
     for factor in (1, 2, 5, 10):

@@ -227,10 +227,13 @@ class GaitSolver:
         """
         known = self.sensitivity_of(w, found)
         if known is None or known[2] > ROUGH_DECREMENT:
-            lin = self.linearise(found.x)
-            matrix = half_hessian(lin.at(w, ROOT_PENALTY), self.structure, is_exact=False)
-            known = _sensitivity(w, lin, matrix.factor(UNDAMPED))
+            return self.rough_slope(w, self.linearise(found.x))
         return known[1]
+
+    def rough_slope(self, w: Array, lin: Linearisation) -> Array:
+        """The same by Gauss-Newton's Hessian, at any gait."""
+        matrix = half_hessian(lin.at(w, ROOT_PENALTY), self.structure, is_exact=False)
+        return _sensitivity(w, lin, matrix.factor(UNDAMPED))[1]
 
     def decrement(self, w: Array, lin: Linearisation, root: Array | None = None) -> float:
         """Undamped relative Newton decrement of a gait; inf where the Hessian is indefinite."""

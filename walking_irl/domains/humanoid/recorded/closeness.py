@@ -8,7 +8,6 @@ knots is one where all are off by that much.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +24,9 @@ SAGITTAL = ("hip_flexion", "knee", "ankle")
 WIDE = {"lumbar": 6.0, "shoulder": 6.0, "elbow": 6.0, "hip_rotation": 6.0, "subtalar": 10.0}
 USUAL, UNSEEN = 3.0, 60.0
 """What a joint may be off [deg]: what WIDE does not name, and what was not recorded."""
-STEP_LENGTH, HALF_PERIOD = 0.02 / np.sqrt(0.05), 0.01 / np.sqrt(0.05)
+PACE_SHARE = 0.05
+"""Of a step length or half period that is off by what it may be, relative to all joints."""
+STEP_LENGTH, HALF_PERIOD = 0.02 / np.sqrt(PACE_SHARE), 0.01 / np.sqrt(PACE_SHARE)
 """What the step length [m] and the half period [s] may be off, to cost as much as all joints."""
 MIDDLE = {
     "pelvis_tilt": "root_pitch",
@@ -40,6 +41,26 @@ MIDDLE = {
     "thorax_rotation": "lumbar_rotation",
 }
 """Columns of recordings without a side, and the model's joints that they tell of."""
+
+
+@dataclass(frozen=True, eq=False)
+class Walk:
+    """A recorded walk, as the model's body would walk it, and how well it was measured.
+
+    Attributes:
+        shown: The gait as recorded.
+        missing: Columns that the recording has not got, by their names there; their joints may be
+            off by as much as they like.
+        variance: Of the mean gait's vector [q row by row, L, T], from the spread of its cycles,
+            shape (N nv + 2,); 0 where one cycle tells nothing of it.
+        force: Vertical force under the right foot over the whole cycle from the first knot, shape
+            (2 N,) [body weights], or None.
+    """
+
+    shown: Gait
+    missing: tuple[str, ...] = ()
+    variance: Array | float = 0.0
+    force: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,22 +81,25 @@ class Closeness:
         return float(away @ (self.weight * away))
 
 
-def closeness(walker: Walker, shown: Gait, missing: Sequence[str] = ()) -> Closeness:
+def closeness(walker: Walker, walk: Walk) -> Closeness:
     """The distance from a recorded gait.
+
+    What a number may be off and how well its mean is known add up as variances do.
 
     Args:
         walker: The body whose joints they are.
-        shown: The gait as recorded.
-        missing: Columns that the recording has not got, by their names there; their joints may be
-            off by as much as they like.
+        walk: The recorded walk.
     """
-    scale = np.array([_scale(walker, i, missing) for i in range(len(walker.joints))])
-    knots = np.tile(scale**-2.0 / (shown.n_knots * len(scale)), shown.n_knots)
-    weight = np.r_[knots, STEP_LENGTH**-2.0, HALF_PERIOD**-2.0]
-    return Closeness(shown.to_vector(), weight)
+    shown = walk.shown
+    scale = np.array([_scale(walker, i, walk.missing) for i in range(len(walker.joints))])
+    share = np.r_[np.full(shown.q.size, 1.0 / shown.q.size), 1.0, 1.0]
+    allowed = np.r_[np.tile(scale**2, shown.n_knots), STEP_LENGTH**2, HALF_PERIOD**2]
+    # of step length and half period the share is within what they may be off
+    measured = walk.variance * np.r_[np.ones(shown.q.size), 1 / PACE_SHARE, 1 / PACE_SHARE]
+    return Closeness(shown.to_vector(), share / (allowed + measured))
 
 
-def _scale(walker: Walker, i: int, missing: Sequence[str]) -> float:
+def _scale(walker: Walker, i: int, missing: tuple[str, ...]) -> float:
     """What a joint may be off [m or rad]."""
     joint = walker.joints[i]
     if joint in ("root_x", "root_y", "root_z"):

@@ -4,17 +4,17 @@ A recorded cycle asks for forces of a body weight at the root, so its costs mean
 
 .. math:: \min_x \; w \cdot G(x) + \tau \, d(x, x_\text{rec})^2
 
-with full root penalty. It has many minima (feet that chatter, other rhythms), so it is sought along
-two ways and the cheaper end counts: *down* from the recording, held strongly at first and ever more
-loosely, and *up* from the known gaits that are nearest, pulled ever more strongly, once beyond what
-is asked and back.
+with full root penalty; a measured vertical force joins the distance. It has many minima (feet that
+chatter, other rhythms), so it is sought along two ways and the cheaper end counts: *down* from the
+recording, held strongly at first and ever more loosely, and *up* from the known gaits that are
+nearest, pulled ever more strongly, once beyond what is asked and back.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,12 +22,15 @@ from walking_irl.arrays import Array
 from walking_irl.domains.humanoid.gait.gait import Gait
 from walking_irl.domains.humanoid.learner import check_weights, known_gaits, solver_for
 from walking_irl.domains.humanoid.optimiser.stages import Stage, stage
+from walking_irl.domains.humanoid.optimiser.transcription import Evaluation
 from walking_irl.domains.humanoid.recorded.closeness import (
     Closeness,
+    Walk,
     closeness,
     degrees_apart,
     sagittal_apart,
 )
+from walking_irl.domains.humanoid.recorded.force_cost import force_apart_from
 from walking_irl.domains.humanoid.spec import WalkerSpec
 from walking_irl.errors import InvalidInputError
 from walking_irl.workers import run_tasks
@@ -54,7 +57,7 @@ class Feasible:
     Attributes:
         gait: The gait.
         total_costs: Its total costs G, shape (K,).
-        pull: tau times the squared distance from the recording.
+        pull: tau times the squared distance from the recording, its force included.
         root: Its largest root force or moment [body weights; half a body weight times a metre].
         degrees: Distance of each joint from the recording [deg], sides as one.
         way: "down" from the recording or "up" from a known gait.
@@ -77,10 +80,9 @@ class Feasible:
 
 def feasible_gait(
     spec: WalkerSpec,
-    shown: Gait,
+    walk: Walk,
     w: Array,
     *,
-    missing: Sequence[str] = (),
     strength: float = STRENGTH,
     near: Sequence[Gait] = (),
     executor: Executor | None = None,
@@ -89,62 +91,70 @@ def feasible_gait(
 
     Args:
         spec: Which body, and its costs.
-        shown: The recorded gait.
+        walk: The recorded walk.
         w: Weights of the costs, shape (K,); of all gaits that are about as near, the cheapest under
             them is found.
-        missing: Columns that the recording has not got.
         strength: tau.
         near: Gaits that solved the like before; then ways lead from them alone.
         executor: Goes the ways side by side.
     """
     w = check_weights(w, spec)
-    to = closeness(spec.walker, shown, missing)
+    to = closeness(spec.walker, walk)
+    held, prices = _held(spec, walk, w, strength)
     legs = (
         _ways(spec, to, strength)
         if not near
         else [("near", g.to_vector(), [_settle(strength, to)]) for g in near]
     )
-    tasks = [(spec, w, x, to, stages) for _, x, stages in legs]
+    tasks = [(held, prices, x, to, stages) for _, x, stages in legs]
     found = run_tasks(_follow, tasks, executor)
     ends = [(name, x) for (name, *_), (xs, _) in zip(legs, found, strict=True) for x in xs]
-    problem = solver_for(spec).problem
-    evaluated = [(way, problem.evaluate(x), strength * to.squared(x)) for way, x in ends]
-    way, ev, pull = min(evaluated, key=lambda e: float(w @ e[1].total_costs()) + e[2])
+    evaluated = [(way, *_evaluated(held, x, to, len(w), strength)) for way, x in ends]
+    way, ev, pull = min(evaluated, key=lambda e: float(w @ e[1].total_costs()[: len(w)]) + e[2])
     gait = Gait.from_vector(ev.x, len(spec.walker.joints))
     return Feasible(
         gait=gait,
-        total_costs=ev.total_costs(),
+        total_costs=ev.total_costs()[: len(w)],
         pull=pull,
         root=float(np.abs(ev.root).max()),
-        degrees=degrees_apart(spec.walker, gait, shown),
+        degrees=degrees_apart(spec.walker, gait, walk.shown),
         way=way,
         iterations=sum(n for _, n in found),
     )
 
 
 def sensitivity(
-    spec: WalkerSpec,
-    found: Feasible,
-    shown: Gait,
-    w: Array,
-    *,
-    missing: Sequence[str] = (),
-    strength: float = STRENGTH,
+    spec: WalkerSpec, found: Feasible, walk: Walk, w: Array, *, strength: float = STRENGTH
 ) -> Array | None:
     """D mu / d w of the nearest gait, shape (K, K); None if it is no smooth minimum.
 
     Args:
         spec: Which body, and its costs.
         found: What :func:`feasible_gait` found, with these arguments.
-        shown: The recorded gait.
+        walk: The recorded walk.
         w: Weights, shape (K,).
-        missing: Columns that the recording has not got.
         strength: tau.
     """
-    solver, to = solver_for(spec), closeness(spec.walker, shown, missing)
+    held, prices = _held(spec, walk, w, strength)
+    solver, to = solver_for(held), closeness(spec.walker, walk)
     lin = solver.linearise(found.gait.to_vector())
-    known = solver.sensitivity(w, lin, tether=strength * to.weight)
-    return None if known is None else known[0]
+    known = solver.sensitivity(prices, lin, tether=strength * to.weight)
+    return None if known is None else known[0][: len(w), : len(w)]
+
+
+def _held(spec: WalkerSpec, walk: Walk, w: Array, strength: float) -> tuple[WalkerSpec, Array]:
+    """The costs, with that of the force where one was measured, and the price of each."""
+    if walk.force is None:
+        return spec, w
+    return replace(spec, costs=(*spec.costs, force_apart_from(walk.force))), np.r_[w, strength]
+
+
+def _evaluated(
+    held: WalkerSpec, x: Array, to: Closeness, K: int, strength: float
+) -> tuple[Evaluation, float]:
+    """A gait, and the pull towards the recording: of its K costs' successor, if there is one."""
+    ev = solver_for(held).problem.evaluate(x)
+    return ev, strength * (to.squared(x) + float(ev.objective_costs[K:].sum()))
 
 
 def check_habit(found: Feasible, accepted: bool = False) -> None:

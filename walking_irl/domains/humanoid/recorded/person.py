@@ -16,6 +16,7 @@ import numpy as np
 
 from walking_irl.arrays import Array
 from walking_irl.domains.humanoid.gait.gait import Gait
+from walking_irl.domains.humanoid.recorded.closeness import Walk
 from walking_irl.errors import InvalidInputError
 
 ONE_PERSON = 1.15
@@ -117,6 +118,21 @@ class Person:
         return len(self.deviations)
 
     @property
+    def walk(self) -> Walk:
+        """The walk as data: its gait, how well that is known, and its force."""
+        known: Array | float = (
+            0.0 if self.cycles < 2 else self._rows.var(axis=0, ddof=1) / self.cycles
+        )
+        force = None if self.force is None else self.force[:, 2]
+        return Walk(self.gait, self.missing, known, force)
+
+    @property
+    def _rows(self) -> Array:
+        """Deviations of each cycle's gait vector, shape (n, N nv + 2)."""
+        flat = self.deviations.reshape(self.cycles, -1)
+        return np.column_stack([flat, self.lengths, self.periods])
+
+    @property
     def covariance(self) -> Array | None:
         """Covariance of the mean gait's vector [q row by row, L, T]; None from fewer than 2 cycles.
 
@@ -125,8 +141,7 @@ class Person:
         n = self.cycles
         if n < 2:
             return None
-        rows = np.column_stack([self.deviations.reshape(n, -1), self.lengths, self.periods])
-        return np.asarray(np.cov(rows.T) / n)
+        return np.asarray(np.cov(self._rows.T) / n)
 
 
 def averaged(trials: Sequence[Person]) -> Person:
