@@ -47,8 +47,6 @@ from walking_irl.expert import expert_from_returns
 from walking_irl.rl.constraints import free_gradient
 from walking_irl.types import Expert, Objective, Response, Rollout
 
-THREADS = 2
-"""Threads of one learner's solve: solves follow one another, so the cores would idle."""
 MIN_WEIGHT = 0.005
 """The learner's lower bound of every weight; the gait of a vanishing weight is ill-defined."""
 N_NEARBY = 40
@@ -223,9 +221,8 @@ class Humanoid:
         executor: Executor | None = None,
         on_step: OnStep | None = None,
     ) -> Learner:
-        """A solver that starts from the demonstrated gait; it has the cores where a pool idles."""
-        threads = 1 if executor is None else THREADS
-        forward = WarmStartSolver(expert.demonstration, self.spec, threads, on_step, mu=expert.mu)
+        """A solver that starts from the demonstrated gait."""
+        forward = WarmStartSolver(expert.demonstration, self.spec, on_step, mu=expert.mu)
         if expert.covariance is None:
             return Learner(forward)
         trials = trials_of(settings(self.options, options, self.name))

@@ -43,9 +43,9 @@ class Start(NamedTuple):
 
 
 @lru_cache
-def solver_for(spec: WalkerSpec = HUMANOID, threads: int = 1) -> GaitSolver:
-    """Solver of one body and its costs; one per process and number of threads."""
-    return GaitSolver(Transcription(spec.walker, spec.costs, threads=threads))
+def solver_for(spec: WalkerSpec = HUMANOID) -> GaitSolver:
+    """Solver of one body and its costs; one per process."""
+    return GaitSolver(Transcription(spec.walker, spec.costs))
 
 
 def warm_up(spec: WalkerSpec, executor: Executor) -> None:
@@ -149,7 +149,6 @@ class WarmStartSolver:
     Args:
         demonstration: Demonstrated gait.
         spec: Which body, and its costs.
-        threads: Threads of one solve.
         on_step: Told of every iteration of a solve in this process: its number and the cost.
         mu: Demonstrated feature expectations, shape (K,); None: those of the gait itself.
 
@@ -164,13 +163,12 @@ class WarmStartSolver:
         self,
         demonstration: Gait,
         spec: WalkerSpec = HUMANOID,
-        threads: int = 1,
         on_step: OnStep | None = None,
         *,
         mu: Array | None = None,
     ) -> None:
-        self.spec, self.threads, self.on_step = spec, threads, on_step
-        solver, self.start = solver_for(spec, threads), demonstration.to_vector()
+        self.spec, self.on_step = spec, on_step
+        solver, self.start = solver_for(spec), demonstration.to_vector()
         self.start = solver.physical(self.start)
         self.demonstrated = solver.problem.evaluate(self.start).total_costs()
         self.known = self.demonstrated if mu is None else -np.asarray(mu)
@@ -178,12 +176,12 @@ class WarmStartSolver:
         self.found: list[Start] = []
 
     def __getstate__(self) -> dict[str, Any]:
-        """One thread in another process, unseen: a pool already uses the cores."""
-        return {**self.__dict__, "threads": 1, "on_step": None}
+        """Unseen in another process."""
+        return {**self.__dict__, "on_step": None}
 
     def __call__(self, w: Array) -> Response:
         """Best gait for weights ``w`` near the demonstration."""
-        solver = solver_for(self.spec, self.threads)
+        solver = solver_for(self.spec)
         # Perturbations make what was seen dearer than its gait, at any weights: no regret, that.
         known = min(float(self.known @ w), float(self.demonstrated @ w))
         solutions = [self._solve(w, self.start, self.root, known)]
@@ -206,7 +204,7 @@ class WarmStartSolver:
         return respond(solver, w, best, solutions[1:], known < cost * (1 + WORTH))
 
     def _solve(self, w: Array, x: Array, root: Array | None, known: float) -> Solution:
-        solver = solver_for(self.spec, self.threads)
+        solver = solver_for(self.spec)
         return solver.solve(w, x, DIRECT, known=known, root=root, on_step=self.on_step)
 
     def recall(self, response: Response) -> None:

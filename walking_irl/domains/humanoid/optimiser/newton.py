@@ -35,10 +35,10 @@ from walking_irl.domains.humanoid.optimiser.transcription import Evaluation
 
 UNDAMPED = 1e-9
 """Damping that only keeps the factorisation from breaking down."""
-START_DAMPING = 1e-3
-MOST_DAMPING = 1.0  # of an indefinite matrix, before it is blended
-SHARES = (1.0, 0.5, 0.25, 0.0)
-"""Shares of the exact Hessian in the blends with Gauss-Newton's, in the order of trial."""
+START_DAMPING, NEAR_DAMPING = 1e-3, 1e-6
+"""Of the first step: from anywhere, and from a demonstration, which is nearly optimal."""
+MOST_DAMPING, SHARES = 1.0, (1.0, 0.5, 0.25, 0.0)
+"""Most damping of an indefinite matrix; then shares of the exact Hessian, blended with the rest."""
 MAX_PERIOD_STEP = 0.1  # [s]
 TRIALS = 16
 """Most step lengths tried in one iteration."""
@@ -175,7 +175,7 @@ class Newton:
         self.tether = np.broadcast_to(stage.tether, anchor.size).copy()
         if np.ndim(stage.tether) == 0:
             self.tether[-2:] *= anchor.size  # L and T concern all knots
-        self.damping = START_DAMPING
+        self.damping = START_DAMPING if known is None else NEAR_DAMPING
         self.last: Model | None = None
 
     def state(self, x: Array) -> State:
