@@ -39,6 +39,7 @@ def add_parser(commands: Any) -> argparse.ArgumentParser:
     add_save(p)
     p.add_argument("--record", type=Path, metavar="FILE.rrd", help="record the rollout")
     add_png(p)
+    p.add_argument("--video", type=Path, metavar="FILE.gif", help="draw it as a moving picture")
     p.add_argument("--plot", type=Path, metavar="FILE.svg", help="draw its curves on the norms")
     p.add_argument("--json", type=Path, metavar="FILE.json", help="write the gait's figures")
     p.add_argument("--quiet", action="store_true", help="print nothing but errors")
@@ -52,7 +53,8 @@ def run(args: argparse.Namespace, console: Console) -> int:
     check_gait_files(args)
     check_ending(args.record, ".rrd")
     check_ending(args.plot, ".svg")
-    check_outputs([args.save, args.record, args.png, args.plot, args.json])
+    check_ending(args.video, ".gif")
+    check_outputs([args.save, args.record, args.png, args.video, args.plot, args.json])
     if not (np.isfinite(args.seconds) and args.seconds > 0):
         raise InvalidInputError(f"seconds must be a positive number, got {args.seconds}")
     domain, w = asked_walker(args, console)
@@ -67,6 +69,10 @@ def run(args: argparse.Namespace, console: Console) -> int:
         "solver": dict(response.info),
     }
     write_gait_files(args, domain.walker, found)
+    if args.video is not None:
+        from walking_irl.domains.humanoid.gait.video import gif
+
+        write_file(args.video, gif(domain.walker, found))
     if args.plot is not None:
         write_file(args.plot, _curves(args.domain, domain.walker, found).encode())
     if args.record is not None:
