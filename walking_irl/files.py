@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,15 +71,25 @@ def write_json(path: Path, content: Mapping[str, Any]) -> None:
     write_file(path, (json.dumps(to_plain(content), indent=1, allow_nan=False) + "\n").encode())
 
 
+def with_arrays(content: bytes, arrays: Mapping[str, Any]) -> bytes:
+    """A compressed ``.npz``, empty at first, with more arrays; what it holds stays as it is."""
+    file = io.BytesIO()
+    file.write(content)
+    with ZipFile(file, "a") as archive:
+        for name, array in arrays.items():
+            member = io.BytesIO()
+            np.lib.format.write_array(member, np.asanyarray(array), allow_pickle=False)
+            archive.writestr(ZipInfo(f"{name}.npy"), member.getvalue(), ZIP_DEFLATED)
+    return file.getvalue()
+
+
 def write_arrays(path: Path, arrays: Mapping[str, Any]) -> None:
     """Write arrays by name as a compressed ``.npz``.
 
     Raises:
         InvalidInputError: If the file cannot be written.
     """
-    content = io.BytesIO()
-    np.savez_compressed(content, allow_pickle=False, **arrays)
-    write_file(path, content.getvalue())
+    write_file(path, with_arrays(b"", arrays))
 
 
 def write_png(path: Path, picture: NDArray[np.uint8]) -> None:

@@ -138,14 +138,14 @@ def test_the_magnified_samples_lie_in_their_box(recorded):
 def test_reward_and_policy_found_are_on_the_grid(recorded, key):
     report, recording = recorded(*key)
     size = report.problem.domain.size
-    image = recording.column("/world/learner/reward", "Image:buffer").rows[-1]
+    image = recording.column("/world/learner/reward/cells", "Image:buffer").rows[-1]
     cells = np.array(image).reshape(size, size, 3).astype(int)
     reward = report.found.reward.reshape(size, size)
     order = np.argsort(reward, axis=None)
     assert np.all(np.diff(cells[..., 2].ravel()[order]) <= 0)  # less blue: more amber
     assert tuple(cells[np.unravel_index(order[-1], reward.shape)]) == style.POLYHEDRON
     assert tuple(cells[np.unravel_index(order[0], reward.shape)]) == style.PAPER
-    arrows = recording.column("/world/learner/policy", "Arrows2D:vectors").rows[-1]
+    arrows = recording.column("/world/learner/reward/policy", "Arrows2D:vectors").rows[-1]
     picture = report.problem.domain.picture(report.found.policy)
     drawn = np.array(arrows).reshape(size, size, 2)[..., ::-1]
     np.testing.assert_allclose(np.sign(drawn), np.sign(picture.arrows))
@@ -154,7 +154,7 @@ def test_reward_and_policy_found_are_on_the_grid(recorded, key):
 def test_a_policy_without_a_reward_leaves_the_grid_of_rewards_empty(recorded):
     report, recording = recorded("gridworld", "lpal")
     assert report.found.reward is None and report.weights is None
-    image = recording.column("/world/learner/reward", "Image:buffer").rows[-1]
+    image = recording.column("/world/learner/reward/cells", "Image:buffer").rows[-1]
     assert np.all(np.reshape(image, (-1, 3)) == style.PAPER)
     assert "not with weights" in recording.summary
 
@@ -162,9 +162,9 @@ def test_a_policy_without_a_reward_leaves_the_grid_of_rewards_empty(recorded):
 def test_objects_stand_where_the_world_has_them(recorded):
     report, recording = recorded("objectworld", "ng-russell-1")
     world = report.problem.domain
-    at = np.array(recording.static("/world/learner/objects")["Points2D:positions"])
+    at = np.array(recording.static("/world/learner/reward/objects/outer")["Points2D:positions"])
     rows, columns = np.divmod(world.objects.cells, world.size)
-    np.testing.assert_allclose(at[: len(rows)], np.c_[columns, rows] + 0.5)
+    np.testing.assert_allclose(at, np.c_[columns, rows] + 0.5)
 
 
 def test_a_lottery_over_policies_is_played_one_by_one_and_ends_with_its_likeliest(recorded):

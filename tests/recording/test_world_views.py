@@ -26,7 +26,7 @@ from walking_irl.types import Iteration
 MOST_FRAMES, MOST_BYTES = 130, 250_000
 """Of one iteration; a default run has up to 38."""
 N_GOALS, N_CELLS = 4, 16
-TOYS = ["gridworld", "lqr", "walking-path", "driving"]
+TOYS = ["gridworld", "objectworld", "lqr", "walking-path", "driving"]
 MOVING = {
     "lqr": ("/world/{}/now", "Points2D:positions"),
     "walking-path": ("/world/{}/people", "Ellipsoids3D:centers"),
@@ -34,9 +34,12 @@ MOVING = {
 }
 """What has a row in every frame."""
 ENTITIES = {
-    "gridworld": ["names", *(f"{who}/{what}" for who in ("learner", "expert")
-                             for what in ("reward", "visits", "policy", "regions"))],
-    "lqr": ["names", "frame", *(f"{who}/{what}" for who in ("learner", "expert")
+    "gridworld": ["names", *(f"{who}/{what}" for who in ("learner", "expert") for what in (
+                             "reward/cells", "visits/cells", "reward/policy", "reward/regions"))],
+    "objectworld": ["names", *(f"{who}/{what}" for who in ("learner", "expert") for what in (
+                               "reward/cells", "visits/cells", "reward/policy",
+                               "reward/objects/inner", "reward/objects/outer"))],
+    "lqr": ["names", "frame", "ticks", *(f"{who}/{what}" for who in ("learner", "expert")
                                 for what in ("now", "trajectory"))],
     "walking-path": ["goals", "goals/names", *(f"{who}/{what}" for who in ("learner", "expert")
                                                for what in ("people", "path", "heading"))],
@@ -150,39 +153,49 @@ def test_an_unknown_expert_is_left_out(shown: Shown, tmp_path: Path) -> None:
     assert "expert" not in view.describe()
 
 
-@only("gridworld")
+@only("gridworld", "objectworld")
 def test_grid_shows_rewards_visits_and_actions(shown: Shown) -> None:
+    Phi = shown.problem.domain.mdp.Phi
+    most = (Phi @ shown.problem.w_expert).max()
     for it, image, arrows in zip(
         shown.iterations,
-        shown.recording.column("/world/learner/reward", "Image:buffer").rows,
-        shown.recording.column("/world/learner/policy", "Arrows2D:vectors").rows,
+        shown.recording.column("/world/learner/reward/cells", "Image:buffer").rows,
+        shown.recording.column("/world/learner/reward/policy", "Arrows2D:vectors").rows,
         strict=False,  # the finale has a row more
     ):
         picture = shown.picture(it.response.policy)
         cells = np.array(image).reshape(N_CELLS, N_CELLS, 3).astype(int)
-        amount = np.where(picture.regions < 0, 0.0, it.w[picture.regions])
+        amount = (Phi @ it.w).reshape(N_CELLS, N_CELLS)
         assert np.all(cells[amount == 0.0] == style.PAPER)
-        below = amount < shown.problem.w_expert.max()  # beyond, the colour is full
+        below = amount < most  # beyond, the colour is full
         order = np.argsort(amount[below])
         assert np.all(np.diff(cells[below][order, 2]) <= 0)  # less blue: more amber
         drawn = np.array(arrows).reshape(N_CELLS, N_CELLS, 2)
         np.testing.assert_allclose(np.sign(drawn[..., ::-1]), picture.arrows)
     expert = shown.picture(shown.problem.expert.demonstration)
-    (seen,) = shown.recording.static("/world/expert/visits")["Image:buffer"]
+    (seen,) = shown.recording.static("/world/expert/visits/cells")["Image:buffer"]
     red = np.array(seen).reshape(N_CELLS, N_CELLS, 3).astype(int)
     assert np.unravel_index(red[..., 1].argmin(), red.shape[:2]) == np.unravel_index(
         expert.visits.argmax(), expert.visits.shape
     )
 
 
-@only("gridworld")
+@only("objectworld")
+def test_objects_lie_in_their_cells(shown: Shown) -> None:
+    found = shown.problem.domain.objects
+    (at,) = [shown.recording.static("/world/learner/reward/objects/inner")["Points2D:positions"]]
+    rows, columns = np.divmod(found.cells, N_CELLS)
+    np.testing.assert_array_equal(np.floor(np.array(at).reshape(-1, 2)), np.c_[columns, rows])
+
+
+@only("gridworld", "objectworld")
 def test_grid_tells_where_learner_and_expert_differ(shown: Shown) -> None:
     agreement = np.ravel(shown.recording.column("/curves/agreement", "Scalars:scalars").rows)
     pi = shown.problem.expert.demonstration
     expected = [100 * np.mean(it.response.policy == pi) for it in shown.iterations]
     np.testing.assert_allclose(agreement, [*expected, 100.0])
     assert agreement[0] < 100.0
-    colours = shown.recording.column("/world/learner/policy", "Arrows2D:colors").rows
+    colours = shown.recording.column("/world/learner/reward/policy", "Arrows2D:colors").rows
     is_blue = [np.array(row) >> 8 == int.from_bytes(bytes(style.LEARNER), "big") for row in colours]
     np.testing.assert_allclose([100 * (1 - row.mean()) for row in is_blue], agreement)
 

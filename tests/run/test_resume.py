@@ -10,7 +10,7 @@ from walking_irl.cli.main import main
 from walking_irl.domains import DOMAINS, WALKERS
 from walking_irl.errors import InvalidInputError
 from walking_irl.recording.reader import inspect_recording
-from walking_irl.run.checkpoint import Checkpoint, Replay, load_checkpoint, save_checkpoint
+from walking_irl.run.checkpoint import Checkpoint, CheckpointFile, Replay, load_checkpoint
 from walking_irl.run.problem import prepare
 from walking_irl.run.setup import Setup
 
@@ -102,7 +102,7 @@ def test_a_run_survives_the_disk(tmp_path, domain):
     shown, K = problem.demonstration, len(problem.objectives)
     w = np.full(K, 1 / K)
     response = problem.learner.forward(w)
-    save_checkpoint(tmp_path / "a.npz", Checkpoint(setup, shown, [(w, response)]))
+    CheckpointFile(tmp_path / "a.npz").save(Checkpoint(setup, shown, [(w, response)]))
     again = load_checkpoint(tmp_path / "a.npz")
     assert again.setup == setup
     assert np.array_equal(again.demonstration.expert.mu, shown.expert.mu)
@@ -116,6 +116,25 @@ def test_a_run_survives_the_disk(tmp_path, domain):
         assert np.array_equal(answer.sensitivity, response.sensitivity)
     pack = problem.domain.pack
     assert np.array_equal(pack(answer.policy), pack(response.policy))
+
+
+def test_a_file_that_grows_holds_what_one_written_at_once_holds(tmp_path):
+    setup = Setup(domain="lqr", weights=None, max_solves=7)
+    problem = prepare(setup)
+    W = np.eye(len(problem.objectives)) * 0.7 + 0.1
+    answers = [(w, problem.learner.forward(w)) for w in W]
+    growing, shown = CheckpointFile(tmp_path / "grown.npz"), problem.demonstration
+    for n in range(len(answers) + 1):
+        growing.save(Checkpoint(setup, shown, answers[:n]))
+    other = [answers[1], answers[0], *answers[2:]]  # not what stands there: begun anew
+    for run, name in ((answers, "at_once"), (other, "other")):
+        CheckpointFile(tmp_path / f"{name}.npz").save(Checkpoint(setup, shown, run))
+    for name in ("at_once", "other"):
+        if name == "other":
+            growing.save(Checkpoint(setup, shown, other))
+        with np.load(tmp_path / "grown.npz") as grown, np.load(tmp_path / f"{name}.npz") as whole:
+            assert sorted(grown.files) == sorted(whole.files)
+            assert all(np.array_equal(grown[key], whole[key]) for key in whole.files)
 
 
 # --- files that cannot be resumed

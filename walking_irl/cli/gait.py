@@ -68,7 +68,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
     }
     write_gait_files(args, domain.walker, found)
     if args.plot is not None:
-        write_file(args.plot, _curves(domain.walker, found).encode())
+        write_file(args.plot, _curves(args.domain, domain.walker, found).encode())
     if args.record is not None:
         _record_walk(args.record, domain, found, args.seconds, w)
     if args.json is not None:
@@ -78,7 +78,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
     return 0
 
 
-def _curves(walker: Any, found: Any) -> str:
+def _curves(name: str, walker: Any, found: Any) -> str:
     """The gait's curves on the band of adults."""
     from walking_irl.domains.humanoid.gait.curve_picture import curves_picture
     from walking_irl.domains.humanoid.gait.curves import gait_curves
@@ -88,7 +88,7 @@ def _curves(walker: Any, found: Any) -> str:
     walks = {f"gait, {found.speed:.2f} m/s": gait_curves(gait_cycle(walker, found))}
     norms = norm_set("adults", found.speed, leg_length(walker))
     note = "adults at self-selected speed, mean and 1 s.d."
-    return curves_picture(f"Best gait of the {walker.name}", walks, norms, note)
+    return curves_picture(f"Best gait of the {name}", walks, norms, note)
 
 
 def _record_walk(path: Path, domain: Any, found: Any, seconds: float, w: Array) -> None:

@@ -19,7 +19,6 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import linprog
 
 from walking_irl.arrays import Array
 from walking_irl.errors import EmptyPolyhedronError
@@ -104,6 +103,8 @@ def utopia(W: Array, M: Array, mu_E: Array) -> Array:
         M: Features of their policies, shape (n, K).
         mu_E: The expert's, shape (K,); returned where there is no such point.
     """
+    from scipy.optimize import linprog  # takes .3 s, and is needed by this algorithm alone
+
     result = linprog(
         -np.ones(len(mu_E)),
         A_ub=W,

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.optimize import brentq
 
 from walking_irl.arrays import Array
 from walking_irl.errors import InvalidInputError
@@ -158,6 +157,8 @@ def iteration_bound(n_objectives: int, accuracy: float, centre: str = "cg") -> f
 
 def _analytic_bound(K: int, alpha: float) -> float:
     """Smallest k of Theorem A2 above its sign change, by bisection on log k."""
+    from scipy.optimize import brentq  # takes .3 s, and is needed here alone
+
     n = K - 1
 
     def excess(log_k: float) -> float:

@@ -120,8 +120,10 @@ def per_unit(interval: Sequence[float], unit: str) -> str:
 
     >>> per_unit((0.25, 0.5), "m^2/s^3"), per_unit((1.0, 1.0), "rad^2 s"), per_unit((0.0, 1.0), "1")
     ('0.25 - 0.5 per m^2/s^3', '1 - 1 per (rad^2 s)', '0 - 1')
+    >>> per_unit((4e-17, 0.589), "s")  # a bound at zero, as a linear program leaves it
+    '0 - 0.589 per s'
     """
-    low, high = interval
+    low, high = (0.0 if abs(x) <= _ROUNDING * max(map(abs, interval)) else x for x in interval)
     unit = f"({unit})" if " " in unit and not unit.startswith("(") else unit
     return f"{low:.3g} - {high:.3g}" + ("" if unit == "1" else f" per {unit}")
 

@@ -12,7 +12,6 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import minimize
 
 from walking_irl.arrays import Array, Indices
 from walking_irl.domains.contract import Compared
@@ -25,6 +24,8 @@ SAMPLED = (60, 30)
 """States, and deviations at each, of :meth:`LQR.advantages`."""
 GAINS_OFF = 0.25
 """Relative error of a sub-optimal expert's gains."""
+PICTURE_STEPS = 16
+"""Of the trajectory that a picture shows."""
 
 
 class LQRPicture(NamedTuple):
@@ -173,6 +174,8 @@ class LQR(ExactDomain):
         Raises:
             SolverError: If it does not converge.
         """
+        from scipy.optimize import minimize  # takes .3 s; other domains come by here, too
+
         K = self.n_objectives
 
         def regret(w: Array) -> tuple[float, Array]:
@@ -192,7 +195,7 @@ class LQR(ExactDomain):
             raise SolverError(f"the least regret was not found: {result.message}")
         return float(result.fun)
 
-    def picture(self, policy: Array, n_steps: int = 16) -> LQRPicture:
+    def picture(self, policy: Array, n_steps: int = PICTURE_STEPS) -> LQRPicture:
         """``n_steps`` steps under gains ``policy``, shape (K,)."""
         k = np.asarray(policy, dtype=np.float64)
         states = self.start * (1 + k) ** np.arange(n_steps + 1.0)[:, None]

@@ -14,7 +14,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linprog
 
 from walking_irl.arrays import Array
 from walking_irl.errors import SolverError
@@ -136,6 +135,8 @@ def _pivot_all(C: Array, A: Array, b: Array, basis: NDArray[np.intp]) -> NDArray
 
 def _highs(c: Array, A: Array, b: Array) -> tuple[Array, Array]:
     """The same by HiGHS, as accurately as it goes: maximiser (n,) and multipliers (m,)."""
+    from scipy.optimize import linprog  # takes .3 s, and is hardly ever needed
+
     for method in ("highs-ds", "highs-ipm"):
         options = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
         result = linprog(-c, A_ub=A, b_ub=b, bounds=(None, None), method=method, options=options)

@@ -12,7 +12,7 @@ import rerun.blueprint as rrb
 from walking_irl.recording import style
 from walking_irl.recording.experiment import Experiment
 from walking_irl.recording.interval_bars import BARS, bounds
-from walking_irl.recording.panels import Panel, panels
+from walking_irl.recording.panels import Panel, has_wide_view, panels
 from walking_irl.recording.progress_view import (
     FIGURES,
     FLOOR,
@@ -25,6 +25,8 @@ from walking_irl.recording.views.view import WorldView
 
 MOST_PLOTS = 4
 """Curves of a world that have a plot each."""
+MOST_ROWS = 7
+"""Rows of the text's table that are seen at once; for more, the lower part is higher."""
 
 
 def blueprint(experiment: Experiment, world: WorldView[Any] | None) -> rrb.Blueprint:
@@ -33,7 +35,8 @@ def blueprint(experiment: Experiment, world: WorldView[Any] | None) -> rrb.Bluep
     Curves of further points stand in the world's place where there is none, else in a tab.
     """
     shown = panels(experiment.names)
-    shadows = [shadow_view(panel, len(shown), bool(experiment.others)) for panel in shown]
+    is_wide = has_wide_view(experiment, world is None)
+    shadows = [shadow_view(panel, len(shown), is_wide) for panel in shown]
     curves = _others(experiment)
     beside = [rrb.Vertical(*curves)] if curves else []
     left: list[rrb.View | rrb.Container] = [world.view()] if world is not None else [*beside]
@@ -59,7 +62,8 @@ def blueprint(experiment: Experiment, world: WorldView[Any] | None) -> rrb.Bluep
     )
     columns = ([1.0] if left else []) + ([share] if right else [])
     rows = [rrb.Horizontal(*top, column_shares=columns), bottom] if top else [bottom]
-    return window(rrb.Vertical(*rows, row_shares=[1.75, 1.0][: len(rows)]))
+    upper = 1.75 if len(experiment.names) <= MOST_ROWS else 1.2
+    return window(rrb.Vertical(*rows, row_shares=[upper, 1.0][: len(rows)]))
 
 
 def motion_blueprint(world: WorldView[Any], plots: Mapping[str, Sequence[str]]) -> rrb.Blueprint:

@@ -102,3 +102,40 @@ def faces_lost(before: Hull, after: Hull, tolerance: float = 1e-9) -> NDArray[np
         (beyond > tolerance)[before.triangles.astype(int)].any(axis=1)
     ]
     return lost
+
+
+def polygon_lost(before: Hull, after: Hull) -> tuple[Array, NDArray[np.uint32]]:
+    """What a cut took away from a polygon in the plane z = 0: points (n, 3) and triangles (m, 3).
+
+    Where ``after`` is no polygon any more, all of ``before``.
+    """
+    if len(after.triangles) == 0 or len(before.triangles) == 0:
+        return before.points, before.triangles
+    rest = before.edges[:, 0]
+    pieces: list[Array] = []
+    triangles: list[list[int]] = []
+    ring = after.edges[:, 0]
+    centre, size = ring.mean(axis=0), float(np.abs(before.points - before.points[0]).max())
+    for a, b in zip(ring, np.roll(ring, -1, axis=0), strict=True):
+        outward = np.array([b[1] - a[1], a[0] - b[0], 0.0])
+        outward *= np.sign(outward @ (a - centre)) / np.linalg.norm(outward)
+        piece, rest = _half(rest, (rest - a) @ outward), _half(rest, (a - rest) @ outward)
+        if len(piece) > 2 and ((piece - a) @ outward).max() > FLAT * size:
+            first = sum(len(found) for found in pieces)
+            triangles += [[first, first + i, first + i + 1] for i in range(1, len(piece) - 1)]
+            pieces.append(piece)
+    points = np.vstack([np.empty((0, 3)), *pieces])
+    return points, np.array(triangles, np.uint32).reshape(-1, 3)
+
+
+def _half(ring: Array, height: Array) -> Array:
+    """The part of a convex polygon, corners (n, 3), whose ``height`` (n,) is not negative."""
+    kept = []
+    for p, q, h, k in zip(
+        ring, np.roll(ring, -1, axis=0), height, np.roll(height, -1), strict=True
+    ):
+        if h >= 0:
+            kept.append(p)
+        if (h < 0 < k) or (k < 0 < h):
+            kept.append(p + h / (h - k) * (q - p))
+    return np.array(kept).reshape(-1, 3)

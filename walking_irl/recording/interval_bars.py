@@ -21,23 +21,32 @@ RAISED = 0.33 * ROW
 """The viewer writes below a point; so much higher, text stands beside its line."""
 WIDTH = 1.72
 """Right end of the whole picture."""
-LETTER = 0.027
-"""Width of a letter of a name."""
 PLACE, HALF = 1.38, 0.25
 """Middle and half width of the magnified bars."""
 LEAST_ZOOM = 2.0
+LETTER, MOST_LETTERS = 0.03, 27
+"""Width of a letter in units of the axis, and how many of a name are shown."""
 DOTS = {"query": (style.LEARNER, 6.5), "estimate": (style.ESTIMATE, 4.0)}
 """Colour and radius of each dot."""
 
 
 def bounds(names: Sequence[str]) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Range in x and in y of the whole picture, for objectives of these names."""
-    return (-room(names), WIDTH), (-0.07, 1.12 * ROW * len(names))
+    """Range in x and in y of the whole picture; left of 0 there is room for the names."""
+    return (-_room(names), WIDTH), (-0.07, 1.12 * ROW * len(names))
 
 
-def room(names: Sequence[str]) -> float:
-    """What the names take, left of the rails."""
-    return max(0.3, 0.04 + LETTER * max(map(len, names)))
+def _room(names: Sequence[str]) -> float:
+    """Width of the column of names, in units of the axis."""
+    return max(0.3, 0.06 + LETTER * max(len(shortened(name)) for name in names))
+
+
+def shortened(name: str) -> str:
+    """A name that leaves room for its bar.
+
+    >>> shortened("far from everything that stands in the way")
+    'far from everything that s…'
+    """
+    return name if len(name) <= MOST_LETTERS else name[: MOST_LETTERS - 1] + "…"
 
 
 class IntervalBars:
@@ -61,8 +70,9 @@ class IntervalBars:
         """Log rails, names, ticks and the ground truth."""
         y = self._y
         _log_rails(stream, "rails", 0.0, 1.0, y)
-        at = np.c_[np.full(len(y), -room(self._names) / 2), y - RAISED]
-        stream.log(f"{BARS}/names", text_2d(at, self._names), static=True)
+        at = np.c_[np.full(len(y), -_room(self._names) / 2), y - RAISED]
+        names = [shortened(name) for name in self._names]
+        stream.log(f"{BARS}/names", text_2d(at, names), static=True)
         ticks = np.linspace(self._least, 1.0, 5)
         below = np.c_[self._place(ticks), np.full(5, y[-1] + 0.5 * ROW)]
         stream.log(f"{BARS}/ticks", text_2d(below, [f"{t:g}" for t in ticks]), static=True)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from walking_irl.arrays import Array
+from walking_irl.recording.experiment import Experiment
 
 TRIANGLE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, math.sqrt(0.75), 0.0]])
 TETRAHEDRON = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / math.sqrt(8) + 0.5
@@ -62,6 +63,11 @@ def panels(names: Sequence[str]) -> list[Panel]:
         chart = TRIANGLE if K == 3 else TETRAHEDRON
         return [Panel("polyhedron/all", ", ".join(names), chart, chart, chart, tuple(names))]
     return [_corner(names, group) for group in GROUPS.get(K, [])]
+
+
+def has_wide_view(experiment: Experiment, is_alone: bool) -> bool:
+    """Whether a single panel has most of the window's width, and so room for a lens beside it."""
+    return len(panels(experiment.names)) == 1 and (is_alone or bool(experiment.others))
 
 
 def _corner(names: Sequence[str], group: tuple[int, ...]) -> Panel:

@@ -20,9 +20,9 @@ from walking_irl.errors import EmptyPolyhedronError
 from walking_irl.recording import style
 from walking_irl.recording.drawing import text_3d
 from walking_irl.recording.experiment import Clock, Experiment, Other
-from walking_irl.recording.hulls import CREASE, Hull, faces_lost, hull
+from walking_irl.recording.hulls import CREASE, Hull, faces_lost, hull, polygon_lost
 from walking_irl.recording.lens import LENS_RADIUS, Lens, lens_of, log_lens, pictures
-from walking_irl.recording.panels import Panel, panels
+from walking_irl.recording.panels import Panel, has_wide_view, panels
 from walking_irl.types import Iteration
 
 CLEAR_EDGES, MOST_EDGES = 40, 90
@@ -61,10 +61,16 @@ LINE = 1.5
 
 
 class PolyhedronView:
-    """Logs the polyhedron of each iteration in every panel."""
+    """Logs the polyhedron of each iteration in every panel.
 
-    def __init__(self, experiment: Experiment) -> None:
+    Args:
+        experiment: What is known before the run.
+        is_alone: Whether no world stands beside it.
+    """
+
+    def __init__(self, experiment: Experiment, *, is_alone: bool = False) -> None:
         self.panels = panels(experiment.names)
+        self._is_wide = has_wide_view(experiment, is_alone)
         self._w_expert = experiment.w_expert
         self._others = experiment.others
         self._density = THIN if experiment.others else 1.0
@@ -125,7 +131,7 @@ class PolyhedronView:
         after: Hull,
     ) -> None:
         clock.set(stream)
-        lens = lens_of(panel, before.points, is_wide=bool(self._others) and len(self.panels) == 1)
+        lens = lens_of(panel, before.points, self._is_wide)
         if lens is None:
             stream.log(f"{panel.path}/lens", rr.Clear(recursive=True))
         else:
@@ -151,12 +157,14 @@ class PolyhedronView:
         after: Hull,
         lens: Lens | None,
     ) -> None:
-        faces = faces_lost(before, after) if not panel.is_flat else before.triangles
+        points, faces = before.points, faces_lost(before, after)
+        if panel.is_flat:
+            points, faces = polygon_lost(before, after)
         if len(faces) == 0:
             return
         edges = _edges_lost(before, after)
         for root, see in pictures(panel, lens):
-            at, strips = before.points, edges
+            at, strips = points, edges
             if see is not None:
                 at, strips = see(at), see(strips)
             stream.log(f"{root}/cut", _mesh(at, faces, style.CUT, self._density * CUT_ALPHA))

@@ -34,6 +34,7 @@ class ProgressView:
         self._K = len(experiment.objectives)
         self._whole: float | None = None
         self._bars = IntervalBars(experiment)
+        self._last: dict[str, list[float]] = {}
 
     def log_static(self, stream: rr.RecordingStream) -> None:
         """Log names and styles of the curves, and the axes of the bars."""
@@ -66,20 +67,20 @@ class ProgressView:
             row = [it.intervals[j, 0], it.w[j], it.intervals[j, 1]]
             if e.w_expert is not None:
                 row.append(e.w_expert[j])
-            stream.log(weight_path(name), rr.Scalars(row))
-            stream.log(feature_path(name), rr.Scalars([e.expert.mu[j], it.response.mu[j]]))
+            self._draw(stream, weight_path(name), *row)
+            self._draw(stream, feature_path(name), e.expert.mu[j], it.response.mu[j])
         for key, value in self._figures(it).items():
             if value is not None and math.isfinite(value):
                 stream.log(f"cpirl/{key}", rr.Scalars(value))
                 if key == "loss" and it.rule is Rule.PROBE:
                     continue  # a probe asks for extreme weights, whose policy is no answer
-                stream.log(f"cpirl/log10/{key}", rr.Scalars(math.log10(max(value, NOTHING))))
+                self._draw(stream, f"cpirl/log10/{key}", math.log10(max(value, NOTHING)))
         for name, other in zip(e.others, others, strict=True):
             if other.share is not None:
-                stream.log(share_path(name), rr.Scalars(other.share))
+                self._draw(stream, share_path(name), other.share)
             if e.w_expert is not None:
                 distance = float(np.abs(other.w - e.w_expert).sum())
-                stream.log(distance_path(name), rr.Scalars(math.log10(max(distance, FLOOR))))
+                self._draw(stream, distance_path(name), math.log10(max(distance, FLOOR)))
         self._bars.log_iteration(stream, it)
         stream.log("log", rr.TextLog(line(it), level=rr.TextLogLevel.INFO))
 
@@ -87,6 +88,16 @@ class ProgressView:
         """From here on the answer is shown, no query."""
         clock.set(stream)
         self._bars.log_answer(stream)
+
+    def log_end(self, stream: rr.RecordingStream, clock: Clock) -> None:
+        """At the last frame: what the curves came to, else their last step has no length."""
+        clock.set(stream)
+        for path, row in self._last.items():
+            stream.log(path, rr.Scalars(row))
+
+    def _draw(self, stream: rr.RecordingStream, path: str, *row: float) -> None:
+        self._last[path] = list(row)
+        stream.log(path, rr.Scalars(row))
 
     def _figures(self, it: Iteration) -> dict[str, float | None]:
         if self._whole is None:

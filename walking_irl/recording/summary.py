@@ -110,8 +110,9 @@ def _legend(experiment: Experiment, world: str) -> str:
         "* **Intervals**: what a weight may be, given everything that was seen. They are no "
         "confidence intervals about an estimate. Right of them the same, magnified.",
         "* **Certificate**: no matter which weights are true, a mixture of the policies found "
-        "loses at most this much. It and the best *regret* bound the same loss from both sides, in "
-        "the unit of the weighed objectives. What is below 1e-7 leaves the plot.",
+        "loses at most this much. The least regret of any weights lies between minus the "
+        "certificate and the best *regret*, in the unit of the weighed objectives. What is below "
+        "1e-7 leaves the plot.",
         "* At the end **probes** ask for the extreme weights of each interval, so that the query "
         "jumps; the loss is drawn of the queries before. The last frames show the answer.",
     ]

@@ -45,7 +45,7 @@ class Recorder(RecordingFile, Generic[Motion]):
         super().__init__(path)
         self.experiment = experiment
         self.world = world
-        self._polyhedron = PolyhedronView(experiment)
+        self._polyhedron = PolyhedronView(experiment, is_alone=world is None)
         self._progress = ProgressView(experiment)
         self._iterations: list[Iteration] = []
         self._n_frames = 0
@@ -96,6 +96,8 @@ class Recorder(RecordingFile, Generic[Motion]):
         world = "" if self.world is None else self.world.describe()
         e, found = self.experiment, None
         if self._iterations:
+            end = Clock(self._n_frames - 1, self._iterations[-1].k)
+            self._progress.log_end(self._stream, end)
             found = summarise(self._iterations, e.expert, e.objectives)
         return summary(e, found, world, ending), properties(e, found, ending)
 

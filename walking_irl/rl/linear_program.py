@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 from scipy import sparse
-from scipy.optimize import linprog
 
 from walking_irl.arrays import Array
 from walking_irl.errors import SolverError
@@ -37,6 +36,8 @@ def linear_program(mdp: FiniteMDP, w: Array) -> Solution:
         SolverError: If HiGHS finds no solution.
     """
     r = mdp.reward(w)
+    from scipy.optimize import linprog  # takes .3 s; every finite domain comes by here
+
     result = linprog(
         -np.tile(r, mdp.n_actions),
         A_eq=flow_constraints(mdp),

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any, get_type_hints
 
@@ -20,7 +20,7 @@ from walking_irl.arrays import Array
 from walking_irl.domains import load
 from walking_irl.domains.contract import Demonstration, Domain, Truth, settings
 from walking_irl.errors import InvalidInputError, reason
-from walking_irl.files import to_plain, write_arrays
+from walking_irl.files import to_plain, with_arrays, write_file
 from walking_irl.run.setup import Setup
 from walking_irl.types import Expert, Forward, Response
 from walking_irl.versions import versions
@@ -68,18 +68,54 @@ class Replay:
         return self.forward(w)
 
 
-def save_checkpoint(path: Path, run: Checkpoint) -> None:
-    """Write a run.
+class CheckpointFile:
+    """Writes a run as it goes: whole every time, but what has not changed is not packed again.
 
-    Raises:
-        InvalidInputError: If the file cannot be written.
+    Args:
+        path: The file.
     """
-    domain, shown = load(run.setup.domain), run.demonstration
-    expert, truth = shown.expert, shown.truth
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._run: Checkpoint | None = None
+        self._packed = b""
+
+    def save(self, run: Checkpoint) -> None:
+        """Write a run, in place of what the file holds.
+
+        Raises:
+            InvalidInputError: If the file cannot be written.
+        """
+        domain, before = load(run.setup.domain), self._run
+        if before is None or not _goes_on(before, run):
+            before, self._packed = replace(run, answers=[]), with_arrays(b"", _expert(run, domain))
+        new: dict[str, Any] = {}
+        for i in range(len(before.answers), len(run.answers)):
+            w, response = run.answers[i]
+            new[f"w_{i}"], new[f"mu_{i}"] = w, response.mu
+            new[f"policy_{i}"] = domain.pack(response.policy)
+            new[f"sensitivity_{i}"] = response.sensitivity
+            new[f"evaluated_{i}"] = response.evaluated
+        self._packed = with_arrays(self._packed, _given(new))
+        self._run = replace(run, answers=list(run.answers))
+        about = np.array(json.dumps(to_plain(_about(run))))
+        write_file(self.path, with_arrays(self._packed, {"about": about}))
+
+
+def _goes_on(before: Checkpoint, run: Checkpoint) -> bool:
+    """Whether a run is the same as before, perhaps with more answers."""
+    if run.demonstration is not before.demonstration or len(run.answers) < len(before.answers):
+        return False
+    pairs = zip(before.answers, run.answers, strict=False)
+    return run.setup == before.setup and all(a[0] is b[0] and a[1] is b[1] for a, b in pairs)
+
+
+def _about(run: Checkpoint) -> dict[str, Any]:
+    expert = run.demonstration.expert
     setup = {k: v for k, v in asdict(run.setup).items() if k not in ("record", "checkpoint")}
     if run.setup.demonstration is not None:
         setup["demonstration"] = str(run.setup.demonstration)
-    about = {
+    return {
         "format": FORMAT,
         "setup": setup,
         "suboptimality": expert.suboptimality,
@@ -87,8 +123,12 @@ def save_checkpoint(path: Path, run: Checkpoint) -> None:
         "info": [dict(response.info) for _, response in run.answers],
         "versions": versions(),
     }
+
+
+def _expert(run: Checkpoint, domain: Domain) -> dict[str, Any]:
+    shown = run.demonstration
+    expert, truth = shown.expert, shown.truth
     arrays = {
-        "about": np.array(json.dumps(to_plain(about))),
         "expert_mu": expert.mu,
         "expert_error": expert.error,
         "expert_covariance": expert.covariance,
@@ -97,16 +137,15 @@ def save_checkpoint(path: Path, run: Checkpoint) -> None:
         "w_expert": None if truth is None else truth.w,
         "true_mu": None if truth is None else truth.mu,
     }
-    for i, (w, response) in enumerate(run.answers):
-        arrays[f"w_{i}"], arrays[f"mu_{i}"] = w, response.mu
-        arrays[f"policy_{i}"] = domain.pack(response.policy)
-        arrays[f"sensitivity_{i}"] = response.sensitivity
-        arrays[f"evaluated_{i}"] = response.evaluated
-    write_arrays(path, {name: array for name, array in arrays.items() if array is not None})
+    return _given(arrays)
+
+
+def _given(arrays: dict[str, Any]) -> dict[str, Any]:
+    return {name: array for name, array in arrays.items() if array is not None}
 
 
 def load_checkpoint(path: Path) -> Checkpoint:
-    """Read a run that :func:`save_checkpoint` wrote.
+    """Read a run that :class:`CheckpointFile` wrote.
 
     Raises:
         InvalidInputError: If there is no such file, or it holds something else.

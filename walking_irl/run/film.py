@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from walking_irl.arrays import Array
 from walking_irl.recording import Experiment, Recorder
 from walking_irl.recording.views.registry import World, world_of
 from walking_irl.run.problem import Problem
@@ -21,14 +22,19 @@ class Film(NamedTuple):
 
     def show(self, it: Iteration) -> None:
         """Show an iteration and its policy."""
-        self.recorder.iteration(it, self._motion(it))
+        self.recorder.iteration(it, self._motion(it.response.policy, it.w))
 
-    def finale(self, it: Iteration) -> None:
-        """Show the answer, with the policy of the recovered weights for longer."""
-        self.recorder.finale(self._motion(it))
+    def finale(self, iterations: Sequence[Iteration], w: Array) -> None:
+        """Show the answer for longer: of all policies found, the best for the recovered weights.
 
-    def _motion(self, it: Iteration) -> Any:
-        return None if self.world is None else self.world.motion(it.response.policy, it.w)
+        The query nearest to them may have a policy far from theirs, where one of the weights is
+        tiny or its solve ended in another minimum.
+        """
+        best = max(iterations, key=lambda it: float(w @ it.response.mu))
+        self.recorder.finale(self._motion(best.response.policy, w))
+
+    def _motion(self, policy: Any, w: Array) -> Any:
+        return None if self.world is None else self.world.motion(policy, w)
 
 
 @contextmanager

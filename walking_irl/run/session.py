@@ -16,7 +16,7 @@ from walking_irl.cpirl.probes import Probing
 from walking_irl.domains.contract import OnStep
 from walking_irl.errors import FallError, InvalidInputError, RecordingError, SolverError
 from walking_irl.files import check_writable
-from walking_irl.run.checkpoint import Checkpoint, Replay, save_checkpoint
+from walking_irl.run.checkpoint import Checkpoint, CheckpointFile, Replay
 from walking_irl.run.problem import Problem, pose, prepare
 from walking_irl.run.report import Report
 from walking_irl.run.setup import Setup
@@ -65,7 +65,7 @@ def run(
     report = Report(problem)
     known = Checkpoint(setup, problem.demonstration, []) if resumed is None else resumed
     if setup.checkpoint is not None:  # when resumed, it may be another file than that was read
-        save_checkpoint(setup.checkpoint, replace(known, setup=setup))
+        CheckpointFile(setup.checkpoint).save(replace(known, setup=setup))
         report.checkpoint = str(setup.checkpoint)
     try:
         with interrupts_kept():
@@ -110,7 +110,8 @@ def _learn(
     executor: Executor | None,
     on_iteration: Callable[[Iteration, Report], None],
 ) -> None:
-    problem = report.problem
+    problem, path = report.problem, report.problem.setup.checkpoint
+    file = None if path is None else CheckpointFile(path)
     with ExitStack() as stack:
         recorded: Film | None = None
         if problem.setup.record is not None:
@@ -121,14 +122,15 @@ def _learn(
         for it in _timed(problem, watch, executor):
             with interrupts_held(), watch.part("recording"):
                 report.iterations.append(it)
-                _keep(report, n_known)
+                if file is not None:
+                    _keep(report, file, n_known)
             on_iteration(it, report)
             if recorded is not None:
                 with watch.part("recording"):
                     recorded.show(it)
         if recorded is not None:
             with watch.part("recording"):
-                recorded.finale(_nearest(report))
+                recorded.finale(report.iterations, report.w)
 
 
 def _timed(problem: Problem, watch: Stopwatch, executor: Executor | None) -> Iterator[Iteration]:
@@ -156,22 +158,16 @@ def _timed(problem: Problem, watch: Stopwatch, executor: Executor | None) -> Ite
         start = time.perf_counter()
 
 
-def _keep(report: Report, n_known: int) -> None:
+def _keep(report: Report, file: CheckpointFile, n_known: int) -> None:
     """Save the run so far; where that fails, the run goes on, and the report tells of it."""
     problem = report.problem
-    path = problem.setup.checkpoint
-    if path is None or report.failed_write is not None:
+    if report.failed_write is not None:
         return
     if len(report.iterations) <= n_known:  # an interrupt here must not shorten what is there
         return
     answers = [(it.w, it.response) for it in report.iterations]
     try:
-        save_checkpoint(path, Checkpoint(problem.setup, problem.demonstration, answers))
-        report.checkpoint = str(path)
+        file.save(Checkpoint(problem.setup, problem.demonstration, answers))
+        report.checkpoint = str(file.path)
     except InvalidInputError as error:
         report.failed_write, report.checkpoint = error, None
-
-
-def _nearest(report: Report) -> Iteration:
-    """The query nearest to the recovered weights."""
-    return min(report.iterations, key=lambda it: float(np.abs(it.w - report.w).sum()))

@@ -13,7 +13,7 @@ from walking_irl.domains.humanoid.costs.base import (
     read_sensors,
 )
 from walking_irl.domains.humanoid.costs.defaults import DEFAULT_COSTS, REFERENCE_WEIGHTS
-from walking_irl.domains.humanoid.costs.partials import second_partials
+from walking_irl.domains.humanoid.costs.partials import first_partials, second_partials
 from walking_irl.domains.humanoid.gait.library import load_library
 from walking_irl.domains.humanoid.optimiser.hessian import Structure, half_hessian
 from walking_irl.domains.humanoid.optimiser.linearisation import Linearisation
@@ -196,16 +196,34 @@ def test_given_multipliers_of_the_root_enter_the_curvature(case):
     assert np.abs(none - expected).max() > 1e-3 * np.abs(expected).max()
 
 
+def reads_of(place, motion):
+    """What a term reads of a motion."""
+    return [
+        np.full((1, 1), motion.h) if i is None else getattr(motion, r.channel)[:, i]
+        for r, i in zip(place.term.reads, place.reads, strict=True)
+    ]
+
+
+def test_closed_first_partials_are_those_by_complex_steps(case):
+    problem, _, x = case
+    stack, motion = problem.stack, problem.evaluate(x).motion
+    assert any(place.term.first is not None for place in stack.places)
+    for place, block in zip(stack.places, stack.first(motion).blocks, strict=True):
+        if place.term.first is None:
+            continue
+        reads = reads_of(place, motion)
+        exact = first_partials(place.term.residual, reads, block.shape[1:])
+        scale = np.abs(exact).max(axis=(1, 2), keepdims=True)
+        assert (np.abs(block - exact) <= 1e-13 * scale).all(), place.cost.name  # rounding
+
+
 def test_closed_second_partials_agree_with_differences_of_complex_steps(case):
     problem, _, x = case
     stack, motion = problem.stack, problem.evaluate(x).motion
     for place, block in zip(stack.places, stack.second(motion), strict=True):
         if place.term.second is None:
             continue
-        reads = [
-            np.full((1, 1), motion.h) if i is None else getattr(motion, r.channel)[:, i]
-            for r, i in zip(place.term.reads, place.reads, strict=True)
-        ]
+        reads = reads_of(place, motion)
         sizes = [np.full(v.shape[1], 1e-3 * (np.abs(v).max() + 1)) for v in reads]
         sizes = [
             np.minimum(s, 2e-3) if r.channel[0] in "sh" else s

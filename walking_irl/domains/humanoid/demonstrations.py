@@ -17,7 +17,6 @@ from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
-from scipy.optimize import nnls
 
 from walking_irl.archives import read_arrays
 from walking_irl.arrays import Array
@@ -178,6 +177,8 @@ def _least(M: Array) -> Array:
     heavy = 1e3  # holds the sum of the weights at one
     K = len(M)
     rows = np.vstack([root, heavy * np.ones((1, K))])
+    from scipy.optimize import nnls  # takes .3 s, and is needed for people's walks alone
+
     w, _ = nnls(rows, np.r_[np.zeros(K), heavy])
     return np.asarray(w / w.sum())
 
@@ -186,6 +187,8 @@ def _towards(w: Array, slope: Array, away: Array) -> Array:
     """Weights whose optimal gait is nearer, on the simplex: one Gauss-Newton step."""
     heavy = 1e3 * float(np.linalg.norm(slope))
     rows = np.vstack([slope, heavy * np.ones((1, len(w)))])
+    from scipy.optimize import nnls
+
     step, _ = nnls(rows, np.r_[away + slope @ w, heavy])
     return np.asarray(step / step.sum())
 

@@ -36,7 +36,7 @@ from walking_irl.domains.humanoid.inverse_optimal_control import (
     nearby_costs,
     stationarity,
 )
-from walking_irl.domains.humanoid.learner import WarmStartSolver, search, solver_for
+from walking_irl.domains.humanoid.learner import WarmStartSolver, search, solver_for, warm_up
 from walking_irl.domains.humanoid.optimiser.solver import Solution
 from walking_irl.domains.humanoid.optimiser.stages import stage
 from walking_irl.domains.humanoid.options import OPTIONS, RECORDING
@@ -156,6 +156,8 @@ class Humanoid:
             FallError: If the expert falls.
             SolverError: If no perturbation of the gait makes it worse by 1 to 10 %.
         """
+        if executor is not None:
+            warm_up(self.spec, executor)
         given = settings(self.options, request.options, self.name)
         if request.expert == "suboptimal":
             refuse(request.options, RECORDING, "a suboptimal gait is known exactly")

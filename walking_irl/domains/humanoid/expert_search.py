@@ -30,12 +30,13 @@ from walking_irl.domains.humanoid.optimiser.stages import Stage, stage
 from walking_irl.domains.humanoid.spec import WalkerSpec
 from walking_irl.workers import run_tasks
 
-APPROACH = (stage(1e4, 25, 1e-5),)
-SOFTLY = (stage(1e3, 25, 1e-4), *APPROACH)
-"""From a gait of other weights, first through a penalty at which it may leave its basin."""
+APPROACH = (stage(1e4, 25, 1e-4),)
+SOFTLY = (stage(1e3, 25, 1e-3), *APPROACH)
+"""From a gait of other weights, first through a penalty at which it may leave its basin. Tolerances
+can be rough: the step that shows a decrement leaves one of about its square."""
 FINISH = (stage(1e6, 60, 1e-11),)
-THERE, BACK = (stage(1e6, 15, 1e-4),), (stage(1e6, 25, 1e-6),)
-"""A detour to a gait of neighbouring weights, and back: roughly, only the best is finished."""
+THERE, BACK = (stage(1e6, 15, 1e-3),), (stage(1e6, 25, 1e-4),)
+"""A detour to a gait of neighbouring weights, and back; only the best is finished."""
 NEAREST = 4
 """Known gaits from which a search starts softly, the cheapest under the weights; the first of them
 and the reference also keep their basins."""
@@ -133,7 +134,9 @@ def best_gait(
     job = _Search(spec, w, executor)
     known = known_gaits(spec)
     near = [s.x for s in sorted(known, key=lambda s: float(s.total_costs @ w))[:NEAREST]]
-    starts = [(x, SOFTLY) for x in near] + [(near[0], APPROACH), (known[0].x, APPROACH)]
+    starts = [(x, SOFTLY) for x in near] + [(near[0], APPROACH)]
+    if near[0] is not known[0].x:
+        starts.append((known[0].x, APPROACH))
     jobs: list[Job] = [(x, stages, job.solver.dual(x)) for x, stages in starts]
     found = sorted(job.run([*jobs, *((x, APPROACH, None) for x in also)]), key=job.search_cost)
     raised = job.run([(s.x, FINISH, s.root) for s in _basins(found, job)])

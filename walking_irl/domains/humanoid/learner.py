@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
@@ -45,6 +46,16 @@ class Start(NamedTuple):
 def solver_for(spec: WalkerSpec = HUMANOID, threads: int = 1) -> GaitSolver:
     """Solver of one body and its costs; one per process and number of threads."""
     return GaitSolver(Transcription(spec.walker, spec.costs, threads=threads))
+
+
+def warm_up(spec: WalkerSpec, executor: Executor) -> None:
+    """Let workers load the body side by side with this process, not when it asks them first."""
+    for _ in range(os.cpu_count() or 1):
+        executor.submit(_load, spec)
+
+
+def _load(spec: WalkerSpec) -> None:
+    solver_for(spec)
 
 
 @lru_cache

@@ -74,6 +74,7 @@ class Objectworld(FiniteDomain):
         method: Forward solver, see :class:`FiniteDomain`.
 
     Attributes:
+        view: Its view in recordings.
         reward: The non-linear reward of each state, shape (S,).
         distances: To the nearest object of each inner, then outer colour [cells], shape (S, 2 C).
         objects: Where the objects are.

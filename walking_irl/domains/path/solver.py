@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import null_space
-from scipy.optimize import minimize
 
 from walking_irl.arrays import Array
 from walking_irl.domains.path.model import costs, gradient, integrate
@@ -178,6 +177,8 @@ def slsqp_path(a: Array, goal: Array, z: Array, tol: float = 1e-9) -> Path:
         return seen[key]
 
     unit = float(np.abs(a).max())
+    from scipy.optimize import minimize  # takes .3 s; other domains come by here, too
+
     result = minimize(
         lambda v: a @ at(v)[0] / unit,
         z,

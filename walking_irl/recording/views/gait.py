@@ -58,6 +58,7 @@ class WalkerView:
         if expert is not None:
             check_rollout(model, expert)
         self._x = 0.0
+        self._played: Frames | None = None
         self._names = body_names(model)
 
     def log_static(self, stream: rr.RecordingStream) -> None:
@@ -102,7 +103,7 @@ class WalkerView:
         stream.send_columns("world/contacts", index, arrows)
         shown = [learner]
         if self.expert is not None:
-            ghost = play(self.model, self.expert, n, self._x)
+            ghost = self._ghost(self.expert, n)
             self._log_walker(stream, clock, "world/expert", beside(ghost))
             shown.append(ghost)
         self._log_joints(stream, clock, np.stack([f.q for f in shown], axis=2))
@@ -154,6 +155,12 @@ class WalkerView:
             f"the learner's gait{ghost}; they start each iteration together, "
             "and orange arrows are ground reaction forces"
         )
+
+    def _ghost(self, expert: Rollout, n: int) -> Frames:
+        """The expert's walk from where the learner is; it is the same one in every iteration."""
+        if self._played is None or len(self._played) < n:
+            self._played = play(self.model, expert, n, 0.0)
+        return self._played.part(n, self._x)
 
     def _load(self, frames: Frames) -> Array:
         """Vertical ground reaction force on all feet [body weights], shape (n,)."""

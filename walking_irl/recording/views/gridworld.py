@@ -1,8 +1,8 @@
-"""Worlds on a grid: reward and policy of the learner and of the expert, and where they go."""
+"""Worlds of cells: reward and policy of the learner and of the expert, and where they go."""
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import rerun as rr
@@ -15,73 +15,95 @@ from walking_irl.recording.drawing import outline, shade, text_2d
 from walking_irl.recording.experiment import Clock
 
 FRAMES, LAST_FRAMES = 48, 120
-GAP = 1.5
-"""Between two grids, in cells."""
+GAP = (1.5, 3.4)
+"""Between two grids, in cells: beside and below each other."""
 MARGIN = (1.0, 2.6, 1.0, 1.0)
 """Left, above, right and below all grids, in cells."""
 ARROW = 0.62
 """Length of an arrow, in cells."""
-OUTER, INNER = 0.34, 0.17
-"""Radius of an object's two colours, in cells."""
+TURNED = 0.5
+"""Steps of two policies that differ by more in a direction go different ways."""
 AGREEMENT = "curves/agreement"
-REWARD, VISITS = {"learner": 0, "expert": 3}, {"learner": 1, "expert": 2}
-"""Which grid is whose, from the left."""
 
 
 class GridMotion(NamedTuple):
-    """A policy, and the reward that it is the best for."""
+    """A policy and the reward that it is the best for, by cell; row 0 is at the top."""
 
     arrows: Array
-    """Mean (row, column) step of the actions in each cell, shape (size, size, 2)."""
+    """Mean (row, column) step, shape (size, size, 2)."""
     visits: Array
-    """Discounted expected visits of each cell, shape (size, size)."""
+    """Discounted expected visits, shape (size, size)."""
     reward: Array | None
-    """Of each cell, shape (size, size), or None where the policy is not one of a reward."""
+    """Shape (size, size), or None where the policy is not one of a reward."""
+
+
+class Landmarks(NamedTuple):
+    """What lies in a grid."""
+
+    regions: Array = np.empty((0, 2, 2))
+    """Upper left and lower right corner (column, row) of each region, shape (n, 2, 2)."""
+    objects: Array = np.empty((0, 2))
+    """Middle (column, row) of each object, shape (m, 2)."""
+    inner: Indices = np.empty(0, np.intp)
+    """Index of the colour within each, shape (m,)."""
+    outer: Indices = np.empty(0, np.intp)
+    """Index of the colour around each, shape (m,)."""
 
 
 class GridworldView:
-    """Shows grids side by side: the learner's left, the expert's right.
+    """Shows grids: the learner's left or above, the expert's right or below.
 
-    The outer grids are coloured by reward and carry the policy's arrows, the inner ones by visits.
+    Some are coloured by reward and carry the policy's arrows, others are coloured by visits.
 
     Args:
+        title: Name of the view.
         size: Cells along a side.
+        landmarks: What lies in the grid.
         expert: The expert's policy and reward, or None where they are not known.
-        regions: Region of each cell, -1 for none, shape (size, size); their outlines are drawn.
-        objects: Objects in cells, with ``cells``, ``inner`` and ``outer`` colours, (n,) each.
+        is_square: Whether the expert's grids stand below the learner's, else all in a row.
     """
 
     curves_name = "Agreement"
 
     def __init__(
         self,
+        title: str,
         size: int,
+        landmarks: Landmarks,
         expert: GridMotion | None = None,
         *,
-        regions: Indices | None = None,
-        objects: Any = None,
+        is_square: bool = False,
     ) -> None:
-        self.size, self.expert = size, expert
-        self.regions, self.objects = regions, objects
+        self.title, self.size, self.landmarks, self.expert = title, size, landmarks, expert
+        order = {"learner/reward": (0, 0), "learner/visits": (1, 0)}
+        if expert is not None:
+            below = {"expert/reward": (0, 1), "expert/visits": (1, 1)}
+            beside = {"expert/reward": (3, 0), "expert/visits": (2, 0)}
+            order |= below if is_square else beside
+        self._corner = {name: (size + np.array(GAP)) * place for name, place in order.items()}
 
     def log_static(self, stream: rr.RecordingStream) -> None:
-        """Log what lies in the world, the expert's grids, and the names of all."""
-        names = ["learner: reward, policy", "learner: visits"]
-        names += ["expert: visits", "expert: true reward, policy"][: 2 * self._has_expert]
-        at = np.array([[self._left(i) + self.size / 2, -2.1] for i in range(len(names))])
-        stream.log("world/names", text_2d(at, names), static=True)
-        for who in ("learner", "expert")[: 1 + self._has_expert]:
-            self._log_marks(stream, who)
+        """Log the expert's grids, and the names of all."""
+        names = {"learner/reward": "learner: reward, policy",
+                 "learner/visits": "learner: visits", "expert/visits": "expert: visits",
+                 "expert/reward": "expert: true reward, policy"}  # fmt: skip
+        at = np.array(list(self._corner.values())) + [self.size / 2, -2.1]
+        stream.log("world/names", text_2d(at, [names[name] for name in self._corner]), static=True)
+        for name, corner in self._corner.items():
+            stream.log(f"world/{name}", rr.Transform3D(translation=[*corner, 0.0]), static=True)
+            box = outline(np.zeros((1, 2)), np.full((1, 2), float(self.size)))
+            lines = rr.LineStrips2D(box, colors=[style.FRAME], radii=rr.Radius.ui_points([0.8]))
+            stream.log(f"world/{name}/frame", lines, static=True)
+            if name.endswith("reward"):
+                self._log_landmarks(stream, f"world/{name}")
         if self.expert is not None:
-            self._log_reward(stream, "expert", self.expert, static=True)
-            self._log_visits(stream, "expert", self.expert, style.EXPERT, static=True)
-            self._log_arrows(stream, "expert", self.expert, np.zeros(self.size**2), static=True)
-            name = rr.SeriesLines(
+            self._log_policy(stream, "expert", self.expert, np.zeros(self.size**2), static=True)
+            line = rr.SeriesLines(
                 names=["cells where both go the same way [%]"],
                 colors=[style.LEARNER],
                 interpolation_mode="StepAfter",
             )
-            stream.log(AGREEMENT, name, static=True)
+            stream.log(AGREEMENT, line, static=True)
 
     def log_iteration(
         self, stream: rr.RecordingStream, clock: Clock, motion: GridMotion, is_last: bool
@@ -90,115 +112,94 @@ class GridworldView:
         clock.set(stream)
         differs = np.zeros(self.size**2)
         if self.expert is not None:
-            other = self.expert.arrows != motion.arrows
-            differs = other.any(axis=-1).ravel().astype(float)
+            apart = np.abs(self.expert.arrows - motion.arrows).max(axis=-1)
+            differs = (apart > TURNED).ravel().astype(float)
             stream.log(AGREEMENT, rr.Scalars(100 * (1 - differs.mean())))
-        self._log_reward(stream, "learner", motion)
-        self._log_visits(stream, "learner", motion, style.LEARNER)
-        self._log_arrows(stream, "learner", motion, differs)
+        self._log_policy(stream, "learner", motion, differs)
         return LAST_FRAMES if is_last else FRAMES
 
     def view(self) -> rrb.View:
         """All grids in one plane."""
         left, above, right, below = MARGIN
-        n = 4 if self._has_expert else 2
+        width, height = np.max(list(self._corner.values()), axis=0) + self.size
         return rrb.Spatial2DView(
             origin="/world",
-            name="Gridworld" if self.objects is None else "Objectworld",
+            name=self.title,
             background=style.PAPER,
             visual_bounds=rrb.VisualBounds2D(
-                x_range=(-left, self._left(n) - GAP + right), y_range=(-above, self.size + below)
+                x_range=(-left, width + right), y_range=(-above, height + below)
             ),
         )
 
     def curves(self) -> list[str]:
         """How many cells' actions are the expert's."""
-        return [f"/{AGREEMENT}"] if self._has_expert else []
+        return [] if self.expert is None else [f"/{AGREEMENT}"]
 
     def describe(self) -> str:
         """One sentence for the summary."""
-        things = "" if self.objects is None else ", objects as dots in their two colours"
+        where = "of the regions " if len(self.landmarks.regions) else ""
         learner = (
-            f"the grid as the learner sees it: its reward in amber{things}, its policy as arrows, "
+            f"the grid as the learner sees it: its reward {where}in amber, its policy as arrows, "
             "and in blue how often each cell is visited (discounted)"
         )
-        if not self._has_expert:
+        if len(self.landmarks.objects):
+            learner += "; dots are objects with an inner and an outer colour"
+        if self.expert is None:
             return learner
         return (
             f"{learner}; in red the expert's visits and beside them its true reward and policy. "
             "Blue arrows go where the expert's do not"
         )
 
-    @property
-    def _has_expert(self) -> bool:
-        return self.expert is not None
-
-    def _left(self, i: int) -> float:
-        """Left edge of grid ``i``."""
-        return i * (self.size + GAP)
-
-    def _log_marks(self, stream: rr.RecordingStream, who: str) -> None:
-        """Outlines of the regions, and the objects, in the grid of rewards."""
-        shift = [self._left(REWARD[who]), 0.0]
-        if self.regions is not None:
-            places = [np.argwhere(self.regions == j) for j in range(self.regions.max() + 1)]
-            lows = np.array([place.min(axis=0) for place in places])
-            highs = np.array([place.max(axis=0) for place in places])
-            frames = outline(lows[:, ::-1] + shift, highs[:, ::-1] + 1.0 + shift)
-            lines = rr.LineStrips2D(
-                frames, colors=[style.POLYHEDRON_EDGE], radii=rr.Radius.ui_points([0.8])
-            )
-            stream.log(f"world/{who}/regions", lines, static=True)
-        if self.objects is not None:
-            rows, columns = np.divmod(self.objects.cells, self.size)
-            colours = np.array(style.OTHERS, dtype=np.uint8)
-            dots = rr.Points2D(
-                np.tile(np.c_[columns, rows] + 0.5 + shift, (2, 1)),
-                colors=colours[np.r_[self.objects.outer, self.objects.inner] % len(colours)],
-                radii=np.repeat([OUTER, INNER], len(rows)),
-                draw_order=15.0,
-            )
-            stream.log(f"world/{who}/objects", dots, static=True)
-
-    def _log_reward(
-        self, stream: rr.RecordingStream, who: str, motion: GridMotion, static: bool = False
-    ) -> None:
-        known = self.expert or motion
-        low, span = 0.0, 1.0
-        if known.reward is not None:
-            low, span = float(known.reward.min()), float(np.ptp(known.reward)) or 1.0
-        reward = np.full((self.size, self.size), low) if motion.reward is None else motion.reward
-        cells = shade((reward - low) / span, style.POLYHEDRON)
-        self._log_cells(stream, f"{who}/reward", REWARD[who], cells, static)
-
-    def _log_visits(
-        self, stream: rr.RecordingStream, who: str, motion: GridMotion, colour: style.Colour,
-        static: bool = False,
-    ) -> None:  # fmt: skip
-        known = motion if self.expert is None else self.expert
-        share = np.sqrt(motion.visits / known.visits.max())  # most cells are visited rarely
-        self._log_cells(stream, f"{who}/visits", VISITS[who], shade(share, colour), static)
-
-    def _log_cells(
-        self, stream: rr.RecordingStream, path: str, i: int, cells: NDArray[np.uint8], static: bool
-    ) -> None:
-        at = rr.Transform3D(translation=[self._left(i), 0.0, 0.0])
-        stream.log(f"world/{path}", at, static=True)
-        stream.log(f"world/{path}", rr.Image(cells, magnification_filter="nearest"), static=static)
-        frame = outline(np.zeros((1, 2)), np.full((1, 2), float(self.size)))
-        lines = rr.LineStrips2D(frame, colors=[style.FRAME], radii=rr.Radius.ui_points([0.8]))
-        stream.log(f"world/{path}/frame", lines, static=True)
-
-    def _log_arrows(
+    def _log_policy(
         self, stream: rr.RecordingStream, who: str, motion: GridMotion, differs: Array,
         static: bool = False,
     ) -> None:  # fmt: skip
+        known = motion if self.expert is None else self.expert
+        visits = np.sqrt(motion.visits / known.visits.max())  # most cells are visited rarely
+        colour = style.LEARNER if who == "learner" else style.EXPERT
+        cells = shade(_share(motion.reward, known.reward, visits.shape), style.POLYHEDRON)
+        _log_cells(stream, f"{who}/reward", cells, static)
+        _log_cells(stream, f"{who}/visits", shade(visits, colour), static)
         rows, columns = np.divmod(np.arange(self.size**2), self.size)
-        centre = np.c_[self._left(REWARD[who]) + columns + 0.5, rows + 0.5]
+        centre = np.c_[columns + 0.5, rows + 0.5]
         vector = ARROW * motion.arrows.reshape(-1, 2)[:, ::-1]
         colours = np.where(differs[:, None] > 0, style.LEARNER, style.INK)
         arrows = rr.Arrows2D(
             origins=centre - vector / 2, vectors=vector, colors=colours.astype(np.uint8),
             radii=np.where(differs > 0, 0.075, 0.045), draw_order=20.0,
         )  # fmt: skip
-        stream.log(f"world/{who}/policy", arrows, static=static)
+        stream.log(f"world/{who}/reward/policy", arrows, static=static)
+
+    def _log_landmarks(self, stream: rr.RecordingStream, root: str) -> None:
+        there = self.landmarks
+        if len(there.regions):
+            lines = rr.LineStrips2D(
+                outline(there.regions[:, 0], there.regions[:, 1]),
+                colors=[style.POLYHEDRON_EDGE],
+                radii=rr.Radius.ui_points([0.8]),
+            )
+            stream.log(f"{root}/regions", lines, static=True)
+        palette = np.array(style.OTHERS, np.uint8)[[2, 1, 0, 3]]  # the first two far apart
+        for name, kind, radius in (("outer", there.outer, 0.42), ("inner", there.inner, 0.22)):
+            if len(there.objects):
+                dots = rr.Points2D(
+                    there.objects, colors=palette[kind % len(palette)], radii=[radius],
+                    draw_order=11.0 - radius,
+                )  # fmt: skip
+                stream.log(f"{root}/objects/{name}", dots, static=True)
+
+
+def _share(reward: Array | None, known: Array | None, shape: tuple[int, ...]) -> Array:
+    """A reward between the least and the largest that is known."""
+    if reward is None:
+        return np.zeros(shape)
+    scale = reward if known is None else known
+    return np.asarray((reward - scale.min()) / (float(np.ptp(scale)) or 1.0))
+
+
+def _log_cells(
+    stream: rr.RecordingStream, path: str, cells: NDArray[np.uint8], static: bool
+) -> None:
+    image = rr.Image(cells, magnification_filter="nearest")
+    stream.log(f"world/{path}/cells", image, static=static)

@@ -25,13 +25,14 @@ class LQRView:
 
     Args:
         names: Of the K axes.
+        n_steps: Steps of a trajectory.
         expert: The expert's trajectory, or None where it is not known.
     """
 
     curves_name = "States"
 
-    def __init__(self, names: list[str], expert: LQRPicture | None = None) -> None:
-        self.names = names
+    def __init__(self, names: list[str], n_steps: int, expert: LQRPicture | None = None) -> None:
+        self.names, self.n_steps = names, n_steps
         self.expert = expert
         K = len(names)
         pairs = [(j, (j + 1) % K) for j in range(K)] if K > 2 else [(0, 1)][: K - 1]
@@ -49,6 +50,7 @@ class LQRView:
         titles += [f"{self.names[j]} over {self.names[i]}" for i, j in self._pairs]
         at = self._corner + [SIDE / 2, -0.17]
         stream.log("world/names", text_2d(at, titles), static=True)
+        self._log_ticks(stream)
         if self.expert is not None:
             lines = self._lines(self.expert)
             log_lines(stream, "world/expert/trajectory", lines, style.GHOST, 3.2, static=True)
@@ -89,7 +91,7 @@ class LQRView:
             name="States: learner (blue) and expert (red)" if self.expert else "States",
             background=style.PAPER,
             visual_bounds=rrb.VisualBounds2D(
-                x_range=(-0.1, width + 0.1), y_range=(-0.28, height + 0.1)
+                x_range=(-0.15, width + 0.1), y_range=(-0.28, height + 0.15)
             ),
         )
 
@@ -102,8 +104,18 @@ class LQRView:
         also = ", **red** is the expert's" if self.expert is not None else ""
         return (
             "every axis on its way from the start to zero under the learner's gains "
-            f"(**blue**{also}): above over time, below one axis over another"
+            f"(**blue**{also}): above over time, below one axis over another; 1 is each axis's "
+            "start"
         )
+
+    def _log_ticks(self, stream: rr.RecordingStream) -> None:
+        """0 and 1 on every axis of a state, and the number of steps under time's."""
+        K, at, labels = len(self.names), [], []
+        for i, corner in enumerate(self._corner):
+            end = f"{self.n_steps} steps" if i < K else "1"
+            at += list(corner + np.array([[-0.07, -0.05], [-0.07, 0.92], [0.93, 1.01]]))
+            labels += ["1", "0", end]
+        stream.log("world/ticks", text_2d(np.array(at), labels), static=True)
 
     def _lines(self, picture: LQRPicture) -> Array:
         """The whole trajectory in every chart, shape (n_charts, T + 1, 2)."""

@@ -39,6 +39,21 @@ class Frames:
     def __len__(self) -> int:
         return len(self.q)
 
+    def part(self, n: int, start: float) -> Frames:
+        """The first ``n`` frames, moved on by ``start`` in x [m]."""
+        forward, loaded = np.array([start, 0.0, 0.0]), int(self.n_contacts[:n].sum())
+        q = self.q[:n].copy()
+        q[:, 0] += start
+        return Frames(
+            q,
+            self.position[:n] + forward,
+            self.orientation[:n],
+            self.com[:n] + forward,
+            self.n_contacts[:n],
+            self.force_at[:loaded] + forward,
+            self.force[:loaded],
+        )
+
 
 def check_rollout(model: mujoco.MjModel, rollout: Rollout) -> None:
     """Raise InvalidInputError unless a rollout has samples of this model's joints."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from walking_irl.arrays import Array
 from walking_irl.domains.contract import Demonstration
+from walking_irl.recording.panels import panels
 from walking_irl.recording.views.view import WorldView
 
 
@@ -44,22 +45,24 @@ def _walker(domain: Any, shown: Demonstration | None) -> World:
 
 
 def _gridworld(domain: Any, shown: Demonstration | None) -> World:
-    from walking_irl.recording.views.gridworld import GridworldView
+    from walking_irl.recording.views.gridworld import Landmarks
 
-    motion, expert = _grid(domain, shown)
-    return World(GridworldView(domain.size, expert, regions=domain.regions), motion)
+    cells = [np.argwhere(domain.regions == j)[:, ::-1] for j in range(len(domain.objectives))]
+    regions = np.array([[at.min(axis=0), at.max(axis=0) + 1] for at in cells], float)
+    return _grid("Gridworld", domain, shown, Landmarks(regions=regions))
 
 
 def _objectworld(domain: Any, shown: Demonstration | None) -> World:
-    from walking_irl.recording.views.gridworld import GridworldView
+    from walking_irl.recording.views.gridworld import Landmarks
 
-    motion, expert = _grid(domain, shown)
-    return World(GridworldView(domain.size, expert, objects=domain.objects), motion)
+    found = domain.objects
+    rows, columns = np.divmod(found.cells, domain.size)
+    at = np.c_[columns, rows] + 0.5
+    return _grid("Objectworld", domain, shown, Landmarks(np.empty((0, 2, 2)), at, *found[1:]))
 
 
-def _grid(domain: Any, shown: Demonstration | None) -> tuple[Callable[..., Any], Any]:
-    """Policies and rewards on a square grid, and the expert's where they are known."""
-    from walking_irl.recording.views.gridworld import GridMotion
+def _grid(title: str, domain: Any, shown: Demonstration | None, landmarks: Any) -> World:
+    from walking_irl.recording.views.gridworld import GridMotion, GridworldView
 
     def motion(policy: Any, w: Array | None = None, reward: Array | None = None) -> GridMotion:
         if reward is None and w is not None:
@@ -68,16 +71,19 @@ def _grid(domain: Any, shown: Demonstration | None) -> tuple[Callable[..., Any],
         seen = None if reward is None else np.reshape(reward, shape)
         return GridMotion(picture.arrows, picture.visits, seen)
 
-    if shown is None or shown.truth is None:
-        return motion, None
-    return motion, motion(shown.policy, shown.truth.w)
+    expert = None
+    if shown is not None and shown.truth is not None:
+        expert = motion(shown.policy, shown.truth.w)
+    is_square = bool(panels([o.name for o in domain.objectives]))  # these stand beside it
+    return World(GridworldView(title, domain.size, landmarks, expert, is_square=is_square), motion)
 
 
 def _lqr(domain: Any, shown: Demonstration | None) -> World:
+    from walking_irl.domains.lqr import PICTURE_STEPS
     from walking_irl.recording.views.lqr import LQRView
 
     names = [o.name for o in domain.objectives]
-    return World(LQRView(names, _picture(domain, shown)), _motion(domain))
+    return World(LQRView(names, PICTURE_STEPS, _picture(domain, shown)), _motion(domain))
 
 
 def _walking_path(domain: Any, shown: Demonstration | None) -> World:

@@ -81,6 +81,8 @@ class Term(NamedTuple):
     residual: Callable[..., Any]
     is_linear: bool = False
     """Linear, or a hinge of something linear: second partials are zero, also across the kink."""
+    first: Callable[..., tuple[Any, ...]] | None = None
+    """First partials by each read in closed form, which is faster; None: by complex steps."""
     second: Callable[..., dict[tuple[int, int], Any]] | None = None
     """Second partials in closed form, which is faster: of the reads, those that are not zero by
     pairs (p, o), p <= o, of positions among the reads; None: by differences."""

@@ -51,8 +51,14 @@ class Effort(Cost):
         names = [walker.joints[walker.n_root + m] for m in motors]
         tau = read_joints(walker, "tau", names)
         if not law.k3.any():
-            return Term((tau,), law.of_torque, second=lambda t: {(0, 0): law.slopes(t)[1]})
-        return Term((tau, read_joints(walker, "q", names)), law.of_both, second=law.second)
+            return Term(
+                (tau,),
+                law.of_torque,
+                first=lambda t: law.slopes(t)[:1],
+                second=lambda t: {(0, 0): law.slopes(t)[1]},
+            )
+        reads = (tau, read_joints(walker, "q", names))
+        return Term(reads, law.of_both, first=law.first, second=law.second)
 
 
 class _Law:
@@ -75,6 +81,12 @@ class _Law:
         th = np.tanh(tau / self.switch)
         bend = self.half * (1 - th * th) / self.switch
         return self.mean + self.half * th + tau * bend, 2 * bend * (1 - tau * th / self.switch)
+
+    def first(self, tau: Any, q: Any) -> tuple[Any, Any]:
+        """First partial derivatives of :meth:`of_both`."""
+        y = q - self.rest
+        slope, _ = self.slopes(tau - self.k3 * y**3)
+        return slope, slope * (-3 * self.k3 * y * y)
 
     def second(self, tau: Any, q: Any) -> dict[tuple[int, int], Any]:
         """Second partial derivatives of :meth:`of_both`."""

@@ -36,9 +36,13 @@ class Impact(Cost):
         def residual(force: Any, force_next: Any, h: Any) -> Any:
             return (force_next - force) / h / unit
 
+        def first(force: Any, force_next: Any, h: Any) -> tuple[Any, Any, Any]:
+            slope = 1 / (h * unit)
+            return -slope, slope, (force - force_next) * slope / h
+
         def second(force: Any, force_next: Any, h: Any) -> dict[tuple[int, int], Any]:
             slope = 1 / (h * h * unit)
             return {(0, 2): slope, (1, 2): -slope, (2, 2): 2 * (force_next - force) * slope / h}
 
         reads = (read_sensors(walker, "s", FEET), read_sensors(walker, "s_next", FEET), H)
-        return [Term(reads, residual, second=second)]
+        return [Term(reads, residual, first=first, second=second)]

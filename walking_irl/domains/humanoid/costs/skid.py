@@ -48,7 +48,14 @@ class Skid(SharedCost):
             read_sensors(walker, "s", z),
             H,
         )
-        return [Term(reads, residual, second=self.second)]
+        return [Term(reads, residual, first=self.first, second=self.second)]
+
+    def first(self, x: Any, x_next: Any, z: Any, h: Any) -> tuple[Any, Any, Any, Any]:
+        """First partial derivatives of the residual."""
+        down = self.contact(z)
+        rate = down / (h * self.speed)
+        moved = (x_next - x) * rate
+        return -rate, rate, -moved * (1 - down) / self.width, -moved / h
 
     def second(self, x: Any, x_next: Any, z: Any, h: Any) -> dict[tuple[int, int], Any]:
         """Second partial derivatives of the residual."""

@@ -37,11 +37,17 @@ class Smoothness(Cost):
         """Two residuals an actuated joint."""
         unit = self.rate * (walker.strength_plus + walker.strength_minus) / 2
 
+        share = np.sqrt(0.5) / self.acceleration
+
         def acceleration(a: Any) -> Any:
-            return np.sqrt(0.5) / self.acceleration * a
+            return share * a
 
         def rate(tau: Any, tau_next: Any, h: Any) -> Any:
             return (tau_next - tau) / h / unit
+
+        def first(tau: Any, tau_next: Any, h: Any) -> tuple[Any, Any, Any]:
+            slope = 1 / (h * unit)
+            return -slope, slope, (tau - tau_next) * slope / h
 
         def second(tau: Any, tau_next: Any, h: Any) -> dict[tuple[int, int], Any]:
             slope = 1 / (h * h * unit)
@@ -49,6 +55,8 @@ class Smoothness(Cost):
 
         torques = (read_joints(walker, "tau"), read_joints(walker, "tau_next"), H)
         return [
-            Term((read_joints(walker, "a"),), acceleration, is_linear=True),
-            Term(torques, rate, second=second),
+            Term(
+                (read_joints(walker, "a"),), acceleration, is_linear=True, first=lambda a: (share,)
+            ),
+            Term(torques, rate, first=first, second=second),
         ]

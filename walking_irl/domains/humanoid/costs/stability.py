@@ -49,4 +49,5 @@ class Stability(Cost):
         def residual(s: Any) -> Any:
             return s * scale
 
-        return [Term((read_sensors(walker, "s", HEAD + MOMENTUM),), residual, is_linear=True)]
+        reads = (read_sensors(walker, "s", HEAD + MOMENTUM),)
+        return [Term(reads, residual, is_linear=True, first=lambda s: (scale,))]

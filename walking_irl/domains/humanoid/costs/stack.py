@@ -140,11 +140,15 @@ class CostStack:
         for place in self.places:
             shape = (len(c.q), place.columns.stop - place.columns.start)
             reads = _reads(place, c)
-            blocks.append(
-                first_partials(place.term.residual, reads, shape)
-                if reads
-                else np.zeros((0, *shape))
-            )
+            if not reads:
+                blocks.append(np.zeros((0, *shape)))
+            elif place.term.first is not None:
+                block = np.empty((len(reads), *shape))
+                for p, value in enumerate(place.term.first(*reads)):
+                    block[p] = value
+                blocks.append(block)
+            else:
+                blocks.append(first_partials(place.term.residual, reads, shape))
         return Partials(self, tuple(blocks))
 
     def second(self, c: Channels) -> tuple[Array, ...]:
@@ -230,6 +234,8 @@ class Partials(NamedTuple):
         out: dict[str, Any] = {c: np.zeros((n, k)) for c, k in zip(CHANNELS, widths, strict=False)}
         h = 0.0
         for place, block in zip(self.stack.places, self.blocks, strict=True):
+            if not y[:, place.columns].any():
+                continue
             for k, (read, index) in enumerate(zip(place.term.reads, place.reads, strict=True)):
                 z = block[k] * y[:, place.columns]
                 if index is None:

@@ -48,7 +48,12 @@ class Work(Cost):
         """Two residuals a motor: at the start and at the end of a step."""
         tau = read_joints(walker, "tau")
         return [
-            Term((tau, read_joints(walker, velocity)), self.residual, second=self.second)
+            Term(
+                (tau, read_joints(walker, velocity)),
+                self.residual,
+                first=self.first,
+                second=self.second,
+            )
             for velocity in ("v", "v_next")
         ]
 
@@ -63,6 +68,16 @@ class Work(Cost):
         p = tau * v
         s = np.sqrt(p * p + self.smoothing**2)
         return np.sqrt(0.5 / self.power) * p * np.sqrt((1 + self.asymmetry * p / s) / s)
+
+    def first(self, tau: Any, v: Any) -> tuple[Any, Any]:
+        """First partial derivatives of :meth:`residual`."""
+        p, soft = tau * v, self.smoothing**2
+        s = p * p + soft
+        root_s = np.sqrt(s)
+        dear = np.sqrt(1 + self.asymmetry * p / root_s)
+        bend = 0.5 * self.asymmetry * soft * p / (s * root_s * dear)
+        slope = np.sqrt(0.5 / self.power / root_s) * ((1 - 0.5 * p * p / s) * dear + bend)
+        return slope * v, slope * tau
 
     def second(self, tau: Any, v: Any) -> dict[tuple[int, int], Any]:
         """Second partial derivatives of :meth:`residual`."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from walking_irl.arrays import Array
 from walking_irl.domains.humanoid.body.anatomy import Walker
@@ -34,7 +33,10 @@ def mirror_average(walker: Walker, q: Array, step_length: float, half_period: fl
 def drifting_spline(
     x: Array, period: float, drift: Array
 ) -> Callable[[Array], tuple[Array, Array]]:
-    """Cubic spline through one period of samples that repeat but for a steady drift.
+    r"""Cubic spline through one period of samples that repeat but for a steady drift.
+
+    Its slopes s solve :math:`s_{i-1} + 4 s_i + s_{i+1} = 3 (x_{i+1} - x_{i-1}) / h`, a circulant
+    system, which Fourier's transform makes diagonal.
 
     Args:
         x: Samples at equal times from 0 on, the last one not repeated; shape (n, m).
@@ -44,11 +46,22 @@ def drifting_spline(
     Returns:
         A function of times (k,): values and derivatives, each of shape (k, m).
     """
-    times = np.arange(len(x) + 1) * (period / len(x))
-    steady = x - np.outer(times[:-1], drift)
-    spline = CubicSpline(times, np.vstack([steady, steady[:1]]), bc_type="periodic")
+    n, h = len(x), period / len(x)
+    steady = x - np.outer(h * np.arange(n), drift)
+    right = 3 * (np.roll(steady, -1, axis=0) - np.roll(steady, 1, axis=0)) / h
+    eigenvalues = 4 + 2 * np.cos(2 * np.pi * np.arange(n // 2 + 1) / n)
+    slopes = np.fft.irfft(np.fft.rfft(right, axis=0) / eigenvalues[:, None], n, axis=0)
 
     def at(time: Array) -> tuple[Array, Array]:
-        return spline(time) + np.outer(time, drift), spline(time, 1) + drift
+        knot = np.floor(np.asarray(time) / h)
+        u = (time / h - knot)[:, None]
+        i = knot.astype(int) % n
+        j = (i + 1) % n
+        rise = steady[j] - steady[i]
+        first, last = h * slopes[i], h * slopes[j]
+        bend, twist = 3 * rise - 2 * first - last, first + last - 2 * rise
+        value = steady[i] + u * (first + u * (bend + u * twist))
+        slope = (first + u * (2 * bend + 3 * u * twist)) / h
+        return value + np.outer(time, drift), slope + drift
 
     return at

@@ -116,7 +116,8 @@ def _add_moving(assembly: Assembly, at: Weighted, pairs: Pairs, numbers: Array) 
     C = pairs.mm.dense(numbers)
     i = np.arange(pairs.knots.n_root)
     C[:, i, i] += at.factors.root[0] ** 2
-    X = (0.5 * C) @ rows
+    own = 0.5 * C.diagonal(axis1=1, axis2=2)[..., None]
+    X = own * rows if pairs.is_diagonal else (0.5 * C) @ rows
     pairs.mu.add(numbers, X)
     left, right = assembly.windows.columns(rows), assembly.windows.columns(X, 4)
     left.close()
@@ -146,10 +147,9 @@ def _by_globals(at: Weighted, pairs: Pairs, numbers: Array) -> _Global:
 
 def _multipliers(at: Weighted, root: Array | None) -> tuple[Multipliers, Array]:
     """Multipliers of all outputs, and of v_next (N, nv)."""
-    y = at.factors.times(at.residuals)
-    channels = at.lin.partials.transpose_times(y.costs)
-    of_root = y.root if root is None else root
-    folded = at.lin.chain.fold(Outputs(channels, of_root, float(y.anchors[1])))
+    f, r, channels = at.factors, at.residuals, at.by_channels
+    of_root = f.root * r.root if root is None else root
+    folded = at.lin.chain.fold(Outputs(channels, of_root, float(f.anchors[1] * r.anchors[1])))
     return folded, channels.v_next
 
 

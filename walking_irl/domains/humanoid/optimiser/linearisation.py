@@ -11,11 +11,12 @@ Costs per metre carry the factor s = sqrt(v0 T / L), so their rows are :math:`s 
 from __future__ import annotations
 
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from walking_irl.arrays import Array
+from walking_irl.domains.humanoid.costs.base import Channels
 from walking_irl.domains.humanoid.costs.stack import CostStack
 from walking_irl.domains.humanoid.optimiser.chain import Chain, Outputs
 from walking_irl.domains.humanoid.optimiser.transcription import (
@@ -132,21 +133,38 @@ class Weighted:
 
     def _pull_back(self, y: Terms) -> Array:
         """:meth:`transpose_times` without the derivative of the per-metre factor."""
-        lin, z = self.lin, self.factors.times(y)
-        channels = lin.partials.transpose_times(z.costs)
-        out = lin.chain.backward(Outputs(channels, z.root, float(z.anchors[1])))
-        out[0] += z.anchors[0]
-        out[-1] += z.anchors[2] * lin.is_period_out
+        z = self.factors.times(y)
+        return self._back(self.lin.partials.transpose_times(z.costs), z.root, z.anchors)
+
+    def _back(self, channels: Channels, root: Array, anchors: Array) -> Array:
+        out = self.lin.chain.backward(Outputs(channels, root, float(anchors[1])))
+        out[0] += anchors[0]
+        out[-1] += anchors[2] * self.lin.is_period_out
         return out
+
+    @cached_property
+    def _by_channels(self) -> tuple[Channels, Channels]:
+        """Half the gradients of the costs per metre, and of the shared ones, by channels."""
+        k, y = self.lin.stack.n_per_metre, self.factors.costs * self.residuals.costs
+        learnt, shared = y.copy(), y
+        learnt[:, k:], shared[:, :k] = 0.0, 0.0
+        back = self.lin.partials.transpose_times
+        return back(learnt), back(shared)
+
+    @property
+    def by_channels(self) -> Channels:
+        """Half the gradient of all costs by channels, at a fixed per-metre factor."""
+        learnt, shared = self._by_channels
+        both: Any = zip(learnt, shared, strict=True)
+        return Channels(*(a + b for a, b in both))
 
     @cached_property
     def _halves(self) -> tuple[Array, Array]:
         """Gradients at a fixed per-metre factor: of the costs per metre, and of all the rest."""
-        k, r = self.lin.stack.n_per_metre, self.residuals
-        learnt, rest = r.costs.copy(), r.costs.copy()
-        learnt[:, k:], rest[:, :k] = 0.0, 0.0
-        zero = Terms(learnt, np.zeros_like(r.root), np.zeros_like(r.anchors))
-        return self._pull_back(zero), self._pull_back(Terms(rest, r.root, r.anchors))
+        learnt, shared = self._by_channels
+        y = self.factors.times(self.residuals)
+        nothing = np.zeros_like(y.root), np.zeros_like(y.anchors)
+        return self._back(learnt, *nothing), self._back(shared, y.root, y.anchors)
 
     @property
     def per_metre_gradient(self) -> Array:

@@ -87,6 +87,7 @@ class Model:
         self.is_indefinite = False
         self._exact: BorderedMatrix | None = None
         self._gauss: BorderedMatrix | None = None
+        self._last: tuple[float, float, Factor] | None = None
 
     def matrix(self, share: float) -> BorderedMatrix:
         """Gauss-Newton's matrix plus a share of what the exact Hessian differs by."""
@@ -94,11 +95,10 @@ class Model:
             self._gauss = half_hessian(self.here, self.structure, is_exact=False)
         if share > 0 and self._exact is None:
             self._exact = half_hessian(self.here, self.structure, self.root)
-        if share in (0.0, 1.0):
-            chosen = self._exact if share else self._gauss
-        else:
+        if 0 < share < 1:
             assert self._gauss is not None and self._exact is not None
-            chosen = self._gauss.blend(self._exact, share)
+            return self._gauss.blend(self._exact, share)
+        chosen = self._exact if share else self._gauss
         assert chosen is not None
         return chosen
 
@@ -107,7 +107,7 @@ class Model:
         start = damping
         while True:
             try:
-                return self.matrix(self.shares[0]).factor(damping, self.tether), damping
+                return self._factored(self.shares[0], damping), damping
             except np.linalg.LinAlgError:
                 self.is_indefinite = True
                 if damping < MOST_DAMPING:
@@ -118,12 +118,17 @@ class Model:
                 else:
                     damping *= 10
 
+    def _factored(self, share: float, damping: float) -> Factor:
+        if self._last is None or self._last[:2] != (share, damping):
+            self._last = share, damping, self.matrix(share).factor(damping, self.tether)
+        return self._last[2]
+
     @cached_property
     def undamped(self) -> Factor | None:
         """Factor of the exact Hessian, else of Gauss-Newton's; None if it is indefinite."""
         has_exact = self._exact is not None or self.shares[0] > 0
         try:
-            return self.matrix(1.0 if has_exact else 0.0).factor(UNDAMPED, self.tether)
+            return self._factored(1.0 if has_exact else 0.0, UNDAMPED)
         except np.linalg.LinAlgError:
             return None
 
@@ -221,10 +226,9 @@ class Newton:
             self.last = model
             step = self.step(at, model, stop)
             is_small = step.predicted < stop * at.cost
-            decrement, cost = np.nan, at.cost
+            decrement, cost, gain = np.nan, at.cost, 0.0
             if is_small or step.to is None:
                 decrement = model.decrement() / cost
-            gain = 0.0
             if step.to is not None:
                 gain, at = (cost - step.to.cost) / cost, step.to
                 passed.append(at.ev.total_costs())
@@ -274,9 +278,8 @@ class Newton:
         """The end of a step, brought back towards what the linear model promised."""
         here, to = model.here, self.state(at.ev.x + dx)
         for _ in range(CORRECTIONS):
-            if at.cost - to.cost >= 0.7 * predicted or predicted < 1e-9 * at.cost:
-                break
-            if not np.isfinite(to.cost):
+            is_good = at.cost - to.cost >= 0.7 * predicted or predicted < 1e-9 * at.cost
+            if is_good or not np.isfinite(to.cost):
                 break
             ahead = weighted(self.problem.stack, to.ev, self.w, self.stage.penalty)
             miss = Terms(

@@ -84,6 +84,7 @@ class Pairs:
         moving: Slots of the moving outputs, then of coordinates that go with a knot ahead.
         still: Slots of the still outputs.
         mm, ss: Same knot, shapes (N, n, n).
+        is_diagonal: Whether no moving output goes with another one at the same knot.
         mu: Moving outputs with coordinates, shape (3, N, n, nv).
         uu: Coordinates of the pairs ``joints`` of joints, shape (N, n, 3, 3).
         global_local: Shape (2, N, size), globals in the order of GLOBALS.
@@ -203,6 +204,7 @@ class Pairs:
         both = (same, left, right)
         self.mm = sort(_are(both, _MOVING, _MOVING), (knot * m + at) * m + at2, (k.n, m, m))
         self.ss = sort(_are(both, _STILL, _STILL), (knot * s + at) * s + at2, (k.n, s, s))
+        self.is_diagonal = bool((self.mm.target % (m * m) % (m + 1) == 0).all())
         (kind2, joint2), (kind1, joint1) = np.divmod(at2, nv), np.divmod(at, nv)
         flat = ((kind2 * k.n + knot) * m + at) * nv + joint2
         self.mu = sort(_are(both, _MOVING, _OWN), flat, (3, k.n, m, nv))
