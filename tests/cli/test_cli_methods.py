@@ -35,6 +35,8 @@ def test_another_method_prints_its_table_and_writes_its_figures(capsys, tmp_path
         (["--method", "mmp", "--mode", "set"], "--mode: CPIRL only"),
         (["--method", "mmp", "--domain", "lqr"], "needs finitely many states"),
         (["--trajectories", "3"], "--trajectories goes with --method"),
+        (["--method", "girl", "--domain", "lqr", "--horizon", "5"], "sees the expert itself"),
+        (["--method", "mmp", "--domain", "gridworld", "--horizon", "0"], "got 100 of 0"),
         (["--method", "maxi"], "unknown method 'maxi'"),
     ],
 )
