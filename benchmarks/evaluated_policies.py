@@ -38,6 +38,7 @@ from walking_irl.domains.lqr import LQR
 from walking_irl.domains.mdp.gridworld import Gridworld
 from walking_irl.domains.path.walking_path import SCALES, WalkingPath
 from walking_irl.geometry.centres import CENTRES
+from walking_irl.rl.chain import Chain
 from walking_irl.rl.finite_mdp import FiniteMDP
 from walking_irl.types import Expert, Forward, Response, Status
 
@@ -139,7 +140,7 @@ def gridworld() -> Setting:
 
         def forward(w: Array) -> Response:
             passed.clear()
-            with mock.patch.object(FiniteMDP, "system", watched(passed)):
+            with mock.patch.object(Chain, "__init__", watched(passed)):
                 return domain.forward(w)
 
         def changed() -> Array:
@@ -158,13 +159,13 @@ def gridworld() -> Setting:
     return Setting("gridworld", lambda rng: domain.expert(draw(rng), rng), learner, None, 10)
 
 
-def watched(passed: list[Array]) -> Callable[[FiniteMDP, Any], Any]:
-    """``FiniteMDP.system`` that keeps every policy that it is asked for."""
-    system = FiniteMDP.system
+def watched(passed: list[Array]) -> Callable[[Chain, FiniteMDP, Any], None]:
+    """The making of a :class:`Chain`, which keeps every policy that it is asked for."""
+    make = Chain.__init__
 
-    def keep(mdp: FiniteMDP, policy: Any) -> Any:
+    def keep(chain: Chain, mdp: FiniteMDP, policy: Any) -> None:
         passed.append(policy)
-        return system(mdp, policy)
+        make(chain, mdp, policy)
 
     return keep
 

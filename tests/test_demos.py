@@ -84,11 +84,12 @@ def test_four_centres_of_one_polyhedron(tmp_path, K):
     curves = [e for e in recording.entities if e.startswith("/distance/")]
     assert len(seen) == len(curves) == 4
     for path, column in zip(sorted(curves), np.argsort(ORDER), strict=True):
-        drawn = [row[0] for row in recording.column(path, "Scalars:scalars").rows]
+        *drawn, end = [row[0] for row in recording.column(path, "Scalars:scalars").rows]
+        assert end == drawn[-1], "a curve goes on to the end"
         assert np.allclose(10 ** np.array(drawn), errors[:, column], atol=1e-5)
     n = int(K) - 1
     gravity = next(e for e in recording.entities if e.startswith("/share/") and "gravity" in e)
-    left = [row[0] for row in recording.column(gravity, "Scalars:scalars").rows]
+    *left, _ = [row[0] for row in recording.column(gravity, "Scalars:scalars").rows]
     assert max(left) <= 1 - (n / (n + 1)) ** n + 1e-6, "Gruenbaum's bound"
     assert np.exp(np.mean(np.log(left))) == pytest.approx(means[1], abs=1e-5)
     content = inspect_recording(tmp_path / "centres.rrd")
