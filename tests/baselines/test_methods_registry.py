@@ -112,6 +112,11 @@ def test_bad_data_and_names_are_named():
         if method.needs in (Needs.ACTIONS, Needs.FEATURES) and FINITE in method.worlds:
             with pytest.raises(InvalidInputError, match="states must lie from 0 to 19"):
                 run_method(method.name, WORLD, far, rng=rng())
+    odd = Demonstrations(np.array([[0]]), np.array([[9]]))
+    for method in METHODS.values():
+        if method.needs is Needs.ACTIONS:
+            with pytest.raises(InvalidInputError, match="actions must lie from 0 to 2"):
+                run_method(method.name, WORLD, odd, rng=rng())
     lost = Expert(np.full(3, np.nan), np.zeros(3))
     with pytest.raises(InvalidInputError, match="finite mu"):
         run_method("cpirl", WORLD, lost, rng=rng())

@@ -70,7 +70,10 @@ def test_subgradient_method_comes_as_close_as_its_rate_says():
     mu_E, l_sa = mdp.feature_expectations(pi), margins(np.eye(3)[pi])
     _, value = quadratic_program(mdp, mu_E, l_sa)
     gaps = [by_subgradients(mdp, mu_E, l_sa, ridge=RIDGE, n_steps=n).c - value for n in (100, 1000)]
-    assert -1e-8 <= gaps[1] <= gaps[0] <= 1e-3
+    assert -1e-8 <= gaps[1] <= gaps[0]
+    # The bound of averaged subgradient steps, 2 G^2 / (ridge (T + 1)) with slopes up to G, is far
+    # above what is reached: 9e-4 and 3e-5 here.
+    assert gaps[0] <= 1e-3 and gaps[1] <= 1e-4
     kept = by_subgradients(mdp, mu_E, l_sa, ridge=RIDGE, n_steps=200, is_nonnegative=True)
     assert kept.w.min() >= 0
 

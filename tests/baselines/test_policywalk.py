@@ -66,20 +66,20 @@ def test_a_chain_that_starts_elsewhere_agrees():
         size = found.info["effective_sample_size"]
         ends.append((found.w, found.samples.std(axis=0) / np.sqrt(size)))
     gap = np.abs(ends[0][0] - ends[1][0])
-    assert (gap <= 4 * np.hypot(ends[0][1], ends[1][1])).all()
+    assert (gap <= 3 * np.hypot(ends[0][1], ends[1][1])).all()
 
 
 @pytest.mark.slow
 def test_intervals_hold_the_weights_as_often_as_they_say():
     inside, ranks = [], []
-    for seed in range(40):
+    for seed in range(60):
         rng = np.random.default_rng([seed, 7])
         mdp, D, w = seen(rng, K=3, n=5, H=10)
         found = policywalk(mdp, D, rng=rng, space="simplex", n_samples=2000, burn_in=400)
         low, high = np.quantile(found.samples, [0.05, 0.95], axis=0)
         inside.append((low - 0.025 <= w) & (w <= high + 0.025))  # half a step of the grid
         ranks.append((found.samples < w).mean(axis=0))
-    share = np.mean(inside)  # 120 weights, three of a run correlated: s.d. about .035
+    share = np.mean(inside)  # 180 weights, three of a run correlated: s.d. about .03
     assert 0.9 - 0.1 <= share
     assert 0.5 - 0.1 <= np.mean(ranks) <= 0.5 + 0.1
 

@@ -80,6 +80,7 @@ def test_wrong_options_of_recover(complaint, option, value):
         ("--seconds", "inf"),
         ("--save", "g.txt"),
         ("--png", "g.jpg"),
+        ("--video", "g.mp4"),
         ("--record", "g.mp4"),
         ("--domain", "lqr"),
     ],

@@ -1,9 +1,13 @@
 import json
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from walking_irl.baselines.registry import METHODS
 from walking_irl.cli.main import main
+from walking_irl.domains.mdp.random_mdp import RandomMDP
+from walking_irl.rl.demonstrations import Demonstrations
 
 
 def test_methods_are_listed_with_where_they_run(capsys):
@@ -31,6 +35,8 @@ def test_another_method_prints_its_table_and_writes_its_figures(capsys, tmp_path
         (["--method", "mmp", "--mode", "set"], "--mode: CPIRL only"),
         (["--method", "mmp", "--domain", "lqr"], "needs finitely many states"),
         (["--trajectories", "3"], "--trajectories goes with --method"),
+        (["--method", "girl", "--domain", "lqr", "--horizon", "5"], "sees the expert itself"),
+        (["--method", "mmp", "--domain", "gridworld", "--horizon", "0"], "got 100 of 0"),
         (["--method", "maxi"], "unknown method 'maxi'"),
     ],
 )
@@ -110,3 +116,48 @@ def test_a_recording_that_fails_at_the_end_keeps_the_result(capsys, tmp_path, mo
     out, err = capsys.readouterr()
     assert "recovered" in out and "no space left" in err
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("states", "actions", "message"),
+    [
+        (
+            [[0, 50]],
+            [[0, 0]],
+            "demonstrated states must lie from 0 to 49 in this world, got 0 to 50",
+        ),
+        ([[-1, 3]], [[0, 0]], "demonstrated states must lie from 0 to 49"),
+        ([[0, 1]], [[0, 4]], "demonstrated actions must lie from 0 to 3"),
+        ([[0, 1]], [[0]], "each of 1 x 2 states needs one action, got actions of shape (1, 1)"),
+        ([[0, 1]], [0, 1], "states and actions of shape (n, H)"),
+        (np.empty((0, 5), int), np.empty((0, 5), int), "at least one trajectory of at least one"),
+        ([[0.5, 1.0]], [[0, 1]], "must be whole numbers"),
+        ([[[0.0]]], [[[np.nan]]], "must be finite"),
+        ([[[0.0]]], [[[1.0]]], "a finite world needs states and actions of shape (n, H)"),
+    ],
+)
+@pytest.mark.parametrize("method", ["mce-likelihood", "projection"])
+def test_bad_demonstrations_are_one_sentence_and_exit_code_2(
+    method, states, actions, message, capsys, monkeypatch
+):
+    monkeypatch.setattr(
+        "walking_irl.run.by_method.demonstrate", lambda *a, **b: Demonstrations(states, actions)
+    )
+    arguments = ["recover", "--domain", "random-mdp", "--method", method, "--trajectories", "5"]
+    assert main([*arguments, "--no-record"]) == 2
+    err = capsys.readouterr().err
+    assert message in err and err.count("\n") == 1
+
+
+def test_rewards_that_are_not_finite_are_one_sentence_and_exit_code_2(capsys, monkeypatch):
+    def broken(self, *args, **options):
+        made(self, *args, **options)
+        Phi = self.mdp.Phi.copy()
+        Phi[3, 1] = np.inf
+        self.mdp = replace(self.mdp, Phi=Phi)
+
+    made = RandomMDP.__init__
+    monkeypatch.setattr(RandomMDP, "__init__", broken)
+    assert main(["recover", "--domain", "random-mdp", "--method", "mmp", "--no-record"]) == 2
+    err = capsys.readouterr().err
+    assert "features of states must be finite with shape (50, K)" in err and err.count("\n") == 1

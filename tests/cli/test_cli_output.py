@@ -96,12 +96,14 @@ def test_gait_writes_every_kind_of_file_and_reads_its_own(call, tmp_path, planar
     weights = ",".join(map(str, PLANAR_SPEC.stack.reference_weights))
     argv = ("gait", *PLANAR, "--weights", weights, "--seconds", 2)
     code, out, err = call(
-        *argv, "--save", "g.npz", "--png", "g.png", "--json", "g.json", "--record", "g.rrd"
-    )
+        *argv, "--save", "g.npz", "--png", "g.png", "--json", "g.json", "--record", "g.rrd",
+        "--video", "g.gif",
+    )  # fmt: skip
     assert code == 0 and not err and "step length" in out
     content = json.loads((tmp_path / "g.json").read_text())
     assert content.keys() >= GAIT_KEYS and content["max_root_residual"] < 5e-4
     assert (tmp_path / "g.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "g.gif").read_bytes().startswith(b"GIF89a")
     assert inspect_recording(tmp_path / "g.rrd")["frames"] > 0
     assert call(*argv, "--save", "g.csv", "--quiet") == (0, "", "")
     with (tmp_path / "g.csv").open(newline="") as file:

@@ -126,6 +126,7 @@ def test_experts_that_lie_inside_without_the_part_from_sub_optimality_are_counte
         outcome["w_expert"] = [0.3 + off, 0.3 - off, 0.4]
     result = Result(LQR, tuple(found))
     assert result.inside_if_vouched.value == pytest.approx(2 / 3)
+    assert result.beyond_half_if_vouched.value == pytest.approx(4 / 9)
     assert result.experts_inside.value == 1.0
     assert result.spreads["of it from the solver"] == pytest.approx((0.02, 0.02, 0.02))
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from recordings import CYCLE, STRIDE, record, run, walk
 
-from walking_irl.recording import Recorder, record_motion
+from walking_irl.recording import Recorder, record_motion, screenshot, style
 from walking_irl.recording.blueprint import blueprint
 from walking_irl.recording.interval_bars import BARS, HALF, MOST_LETTERS, PLACE, bounds
 from walking_irl.recording.panels import panels
@@ -130,3 +130,35 @@ def test_the_table_of_many_objectives_is_seen_without_scrolling(model: mujoco.Mj
         upper, lower = shares
         share[K] = lower / (upper + lower)
     assert share[9] > share[6]
+
+
+def test_a_slow_viewer_is_asked_again_until_it_has_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    answers = iter([TimeoutError, TimeoutError, "drawn"])
+
+    def call() -> str:
+        answer = next(answers)
+        if isinstance(answer, str):
+            return answer
+        raise answer
+
+    assert screenshot._patiently(call) == "drawn"
+    monkeypatch.setattr(screenshot, "LOAD_SECONDS", 0.0)
+
+    def never() -> str:
+        raise TimeoutError
+
+    with pytest.raises(TimeoutError):
+        screenshot._patiently(never)
+
+
+def test_text_is_read_on_the_plates_of_both_themes() -> None:
+    """Contrast of the text with its plate over paper, by WCAG 2.1; 4.5 is asked for there."""
+    for plate in ((146, 146, 144), (234, 234, 232)):  # as the viewer draws them: dark, light
+        light, dark = sorted((luminance(plate), luminance(style.LABEL)), reverse=True)
+        assert (light + 0.05) / (dark + 0.05) > 4.5
+
+
+def luminance(colour: style.Colour) -> float:
+    c = np.array(colour) / 255
+    linear = np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
+    return float(linear @ [0.2126, 0.7152, 0.0722])

@@ -35,7 +35,8 @@ def recorded(tmp_path_factory):
     def make(domain, method):
         if (domain, method) not in known:
             n = CASES[domain, method]
-            report = recover_by(method, Setup(domain=domain, seed=1), n_trajectories=n, horizon=30)
+            seen = {} if n is None else {"n_trajectories": n, "horizon": 30}
+            report = recover_by(method, Setup(domain=domain, seed=1), **seen)
             path = tmp_path_factory.mktemp("method") / "a.rrd"
             record_report(report, path)
             known[domain, method] = report, Recording(path)

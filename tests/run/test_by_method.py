@@ -53,7 +53,12 @@ def test_methods_without_weights_report_a_policy():
     [
         ("guess", "lqr", {}, "unknown method 'guess'; choose from ng-russell-1"),
         ("mmp", "humanoid", {}, "needs finitely many states"),
-        ("girl", "gridworld", {}, "gradient of policies with parameters, gridworld has none"),
+        (
+            "girl",
+            "gridworld",
+            {},
+            "policies with parameters and the gradient of their features; gridworld offers none",
+        ),
         ("cpirl", "lqr", {"n_trajectories": 5}, "takes no trajectories"),
         ("mmp", "gridworld", {"n_trajectories": 0}, "got 0 of 50"),
         ("mmp", "gridworld", {"n_trajectories": 5, "horizon": 0}, "got 5 of 0"),

@@ -67,7 +67,6 @@ def run(args: argparse.Namespace, given: dict[str, Any], console: Console) -> in
     own += ["--archive"] if args.archive is not None else []
     if own:
         raise InvalidInputError(f"{', '.join(own)}: CPIRL only, leave out with --method")
-    horizon = HORIZON if args.horizon is None else args.horizon
     setup = Setup(**given)
     domain = load(setup.domain)
     default = Path(f"{domain.defaults.files or setup.domain}-{args.method}.rrd")
@@ -79,7 +78,7 @@ def run(args: argparse.Namespace, given: dict[str, Any], console: Console) -> in
             args.method,
             setup,
             n_trajectories=args.trajectories,
-            horizon=horizon,
+            horizon=args.horizon,
             executor=executor,
         )
     if args.record is None:

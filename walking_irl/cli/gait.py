@@ -39,6 +39,7 @@ def add_parser(commands: Any) -> argparse.ArgumentParser:
     add_save(p)
     p.add_argument("--record", type=Path, metavar="FILE.rrd", help="record the rollout")
     add_png(p)
+    p.add_argument("--video", type=Path, metavar="FILE.gif", help="draw it as a moving picture")
     p.add_argument("--plot", type=Path, metavar="FILE.svg", help="draw its curves on the norms")
     p.add_argument("--json", type=Path, metavar="FILE.json", help="write the gait's figures")
     p.add_argument("--quiet", action="store_true", help="print nothing but errors")
@@ -52,7 +53,8 @@ def run(args: argparse.Namespace, console: Console) -> int:
     check_gait_files(args)
     check_ending(args.record, ".rrd")
     check_ending(args.plot, ".svg")
-    check_outputs([args.save, args.record, args.png, args.plot, args.json])
+    check_ending(args.video, ".gif")
+    check_outputs([args.save, args.record, args.png, args.video, args.plot, args.json])
     if not (np.isfinite(args.seconds) and args.seconds > 0):
         raise InvalidInputError(f"seconds must be a positive number, got {args.seconds}")
     domain, w = asked_walker(args, console)
@@ -67,8 +69,12 @@ def run(args: argparse.Namespace, console: Console) -> int:
         "solver": dict(response.info),
     }
     write_gait_files(args, domain.walker, found)
+    if args.video is not None:
+        from walking_irl.domains.humanoid.gait.video import gif
+
+        write_file(args.video, gif(domain.walker, found))
     if args.plot is not None:
-        write_file(args.plot, _curves(domain.walker, found).encode())
+        write_file(args.plot, _curves(args.domain, domain.walker, found).encode())
     if args.record is not None:
         _record_walk(args.record, domain, found, args.seconds, w)
     if args.json is not None:
@@ -78,7 +84,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
     return 0
 
 
-def _curves(walker: Any, found: Any) -> str:
+def _curves(name: str, walker: Any, found: Any) -> str:
     """The gait's curves on the band of adults."""
     from walking_irl.domains.humanoid.gait.curve_picture import curves_picture
     from walking_irl.domains.humanoid.gait.curves import gait_curves
@@ -88,7 +94,7 @@ def _curves(walker: Any, found: Any) -> str:
     walks = {f"gait, {found.speed:.2f} m/s": gait_curves(gait_cycle(walker, found))}
     norms = norm_set("adults", found.speed, leg_length(walker))
     note = "adults at self-selected speed, mean and 1 s.d."
-    return curves_picture(f"Best gait of the {walker.name}", walks, norms, note)
+    return curves_picture(f"Best gait of the {name}", walks, norms, note)
 
 
 def _record_walk(path: Path, domain: Any, found: Any, seconds: float, w: Array) -> None:

@@ -10,6 +10,8 @@ from rich.table import Table
 
 from walking_irl.cli import DONE
 
+LONGEST_WORD = 12
+
 
 def add_parser(commands: Any) -> argparse.ArgumentParser:
     """The command's parser."""
@@ -25,8 +27,8 @@ def run(args: argparse.Namespace, console: Console) -> int:
 
     table = Table()
     table.add_column("method", no_wrap=True)
-    for name in ("needs", "answers with", "forward solves", "guarantee", "worlds"):
-        table.add_column(name, overflow="fold")
+    for name in ("needs", "answers with", "guarantee", "worlds"):
+        table.add_column(name, overflow="fold", min_width=LONGEST_WORD)
     for m in METHODS.values():
         reward = "linear" if m.is_linear else "any"
         needs = m.needs.value + (", model" if m.needs_model else "")
@@ -34,11 +36,15 @@ def run(args: argparse.Namespace, console: Console) -> int:
         table.add_row(
             m.name,
             needs,
-            f"{m.answer} ({reward} reward)",
-            m.solves,
+            f"{m.answer} ({reward} reward); {_count(m.solves)} solves",
             m.guarantee,
             worlds,
         )
     console.print(table)
+    console.print("solves: forward problems; model: the transition probabilities")
     console.print("measured losses: walking-irl tables 3.1; to run one: recover --method NAME")
     return DONE
+
+
+def _count(solves: str) -> str:
+    return "no" if solves == "none" else solves

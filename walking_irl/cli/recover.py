@@ -92,8 +92,8 @@ def _add_outputs(out: Any) -> None:
         "--record",
         type=Path,
         metavar="FILE.rrd",
-        help="where the recording goes (walking.rrd, or as the domain is called; an earlier one is "
-        "kept under a number); the expert's rollouts go beside it",
+        help="where the recording goes (walking.rrd, or as domain and method are called; an "
+        "earlier one is kept under a number); the expert's rollouts go beside it",
     )
     out.add_argument("--no-record", action="store_true", help="write no recording")
     out.add_argument(

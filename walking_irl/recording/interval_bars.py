@@ -24,7 +24,7 @@ WIDTH = 1.72
 PLACE, HALF = 1.38, 0.25
 """Middle and half width of the magnified bars."""
 LEAST_ZOOM = 2.0
-LETTER, MOST_LETTERS = 0.025, 27
+LETTER, MOST_LETTERS = 0.03, 27
 """Width of a letter in units of the axis, and how many of a name are shown."""
 DOTS = {"query": (style.LEARNER, 6.5), "estimate": (style.ESTIMATE, 4.0)}
 """Colour and radius of each dot."""

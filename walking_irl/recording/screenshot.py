@@ -8,8 +8,9 @@ import socket
 import subprocess
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import TypeVar
 
 import rerun_cli
 from rerun.experimental import ViewerClient
@@ -19,6 +20,8 @@ from walking_irl.files import check_writable, write_file
 from walking_irl.recording.reader import check_recording
 
 LOAD_SECONDS = 60.0
+"""Longest wait for the viewer to load or to draw [s]."""
+Answer = TypeVar("Answer")
 DRIVER = "install software Vulkan: apt-get install mesa-vulkan-drivers"
 
 
@@ -71,11 +74,16 @@ def save_screenshot(
                 hide_welcome_screen=True,
             ) as viewer,
         ):
-            viewer.open([str(file.resolve())])
+            _patiently(lambda: viewer.open([str(file.resolve())]))
             _show(viewer, frame)
             time.sleep(settle)
-            picture = viewer.take_screenshot()
-    except (RuntimeError, OSError, TimeoutError) as error:
+            picture = _patiently(viewer.take_screenshot)
+    except TimeoutError as error:
+        raise RecordingError(
+            f"the viewer has not drawn {file} in {LOAD_SECONDS:.0f} s; is this machine busy? "
+            "try again"
+        ) from error
+    except (RuntimeError, OSError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise RecordingError(
             f"the viewer cannot draw without a screen ({reason}); {DRIVER}"
@@ -84,11 +92,22 @@ def save_screenshot(
     return target
 
 
+def _patiently(call: Callable[[], Answer]) -> Answer:
+    """Ask again where the viewer, on a busy machine, takes longer than its client waits."""
+    deadline = time.monotonic() + LOAD_SECONDS
+    while True:
+        try:
+            return call()
+        except TimeoutError:
+            if time.monotonic() > deadline:
+                raise
+
+
 def _show(viewer: ViewerClient, frame: int | None) -> None:
     """Wait until the recording is loaded, then stop at a frame."""
     deadline = time.monotonic() + LOAD_SECONDS
     while True:
-        state = viewer.get_state()
+        state = _patiently(viewer.get_state)
         if not state.loading and state.recordings:
             break
         if time.monotonic() > deadline:

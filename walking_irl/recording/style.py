@@ -28,8 +28,8 @@ SKIN: Colour = (222, 178, 148)
 ASPHALT: Colour = (150, 152, 158)
 GRASS: Colour = (178, 204, 160)
 GLASS: Colour = (52, 56, 66)
-LABEL: Colour = (255, 255, 255)
-"""Text; the viewer puts it on a dark plate."""
+LABEL: Colour = (22, 24, 30)
+"""Text; the viewer puts it on a plate, grey in its dark theme and nearly white in its light one."""
 
 PLAYBACK_RATE = 40.0
 """Frames per second of ``sim_time`` [1/s]."""

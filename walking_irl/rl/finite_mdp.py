@@ -69,6 +69,11 @@ class FiniteMDP:
                 f"an MDP of {S} states needs transitions (A * {S}, {S}) and a start ({S},), "
                 f"got {self.T.shape} and {self.start.shape}"
             )
+        if self.Phi.ndim != 2 or not np.isfinite(self.Phi).all():
+            raise InvalidInputError(
+                f"features of states must be finite with shape ({S}, K), got {self.Phi.shape} with "
+                f"{int(np.count_nonzero(~np.isfinite(self.Phi)))} values that are not finite"
+            )
         if not 0 <= self.discount < 1:
             raise InvalidInputError(f"discount must lie in [0, 1), got {self.discount}")
         rows = np.asarray(self.T.sum(axis=1)).ravel()

@@ -117,7 +117,7 @@ def recover_by(
     setup: Setup,
     *,
     n_trajectories: int | None = None,
-    horizon: int = HORIZON,
+    horizon: int | None = None,
     executor: Executor | None = None,
 ) -> MethodReport:
     """Make the expert that a setup asks for, and explain it by a method.
@@ -127,7 +127,7 @@ def recover_by(
         setup: Domain, weights and expert; what concerns CPIRL has no effect.
         n_trajectories: Demonstrations that stand for the expert in finite worlds; by default 100
             for methods that read actions, and the exact expert for the others.
-        horizon: Steps of each.
+        horizon: Steps of each, 50 by default.
         executor: Runs independent solves of the expert side by side.
 
     Raises:
@@ -135,28 +135,24 @@ def recover_by(
     """
     if method not in METHODS:
         raise InvalidInputError(f"unknown method {method!r}; choose from {', '.join(METHODS)}")
-    mdp = _check(METHODS[method], load(setup.domain), n_trajectories, horizon)
+    domain = load(setup.domain)
+    mdp = _check(METHODS[method], domain)
+    n, steps = _seen(METHODS[method], domain, mdp, n_trajectories, horizon)
     problem = prepare(setup, executor)  # may take minutes: what cannot run is said before
     rng = np.random.default_rng([setup.seed, 2])
     data: Expert | Demonstrations = problem.expert
-    n = n_trajectories or 0
-    if n_trajectories is None and mdp is not None and METHODS[method].needs is Needs.ACTIONS:
-        n = TRAJECTORIES
-    if n:
-        assert mdp is not None
-        data = demonstrate(mdp, problem.demonstration.policy, n, horizon, rng=rng)
+    if mdp is not None and n:
+        data = demonstrate(mdp, problem.demonstration.policy, n, steps, rng=rng)
     start = time.perf_counter()
     found = run_method(method, _world(problem), data, rng=rng)
     return MethodReport(method, problem, found, n, time.perf_counter() - start)
 
 
-def _check(
-    method: Method, domain: Domain, n_trajectories: int | None, horizon: int
-) -> FiniteMDP | None:
+def _check(method: Method, domain: Domain) -> FiniteMDP | None:
     """The domain's finite MDP, if it has one.
 
     Raises:
-        InvalidInputError: If the method cannot run on it, or not with such demonstrations.
+        InvalidInputError: If the method cannot run on it.
     """
     found = getattr(domain, "mdp", None)
     mdp = found if isinstance(found, FiniteMDP) else None
@@ -170,17 +166,33 @@ def _check(
         raise InvalidInputError(
             f"{method.name} needs {HOOKS[method.hook]}; {domain.name} offers none"
         )
-    if n_trajectories is None:
-        return mdp
-    if n_trajectories < 1 or horizon < 1:
-        raise InvalidInputError(
-            f"need at least one trajectory of one step, got {n_trajectories} of {horizon}"
-        )
-    if mdp is None:
-        raise InvalidInputError(f"{domain.name} takes no trajectories of states and actions")
-    if method.needs is Needs.POLICY:
-        raise InvalidInputError(f"{method.name} sees the expert's policy; it takes no trajectories")
     return mdp
+
+
+def _seen(
+    method: Method, domain: Domain, mdp: FiniteMDP | None, n: int | None, horizon: int | None
+) -> tuple[int, int]:
+    """How many trajectories a method sees, 0 for the expert itself, and their steps.
+
+    Raises:
+        InvalidInputError: If it sees none where some are asked for.
+    """
+    if n is not None and mdp is None:
+        raise InvalidInputError(f"{domain.name} takes no trajectories of states and actions")
+    if n is not None and method.needs is Needs.POLICY:
+        raise InvalidInputError(f"{method.name} sees the expert's policy; it takes no trajectories")
+    reads_actions = mdp is not None and method.needs is Needs.ACTIONS
+    if n is None and not reads_actions:
+        if horizon is not None:
+            raise InvalidInputError(
+                f"{method.name} on {domain.name} sees the expert itself, and no trajectories of "
+                "some horizon: leave it out"
+            )
+        return 0, 0
+    n, steps = TRAJECTORIES if n is None else n, HORIZON if horizon is None else horizon
+    if n < 1 or steps < 1:
+        raise InvalidInputError(f"need at least one trajectory of one step, got {n} of {steps}")
+    return n, steps
 
 
 def _world(problem: Problem) -> Any:

@@ -28,8 +28,7 @@ NOTES = (
     "all of an exact expert's, is the same at every level.",
     "Beyond half: truths farther from the recovered weight than half of the half width, on their "
     "side. Next to none would mean that intervals are wider than they need be.",
-    "Without the part from sub-optimality: had every expert been taken for exactly optimal, as "
-    "--expert-gap 0 does.",
+    "Vouched for: without the part from sub-optimality, as --expert-gap 0 has it.",
     "CPU seconds are those of one process, its expert included; machines differ.",
 )
 NOTHING = "n/a"
@@ -64,7 +63,8 @@ def figures(result: Result) -> list[tuple[str, str]]:
         ("experts with every weight inside", f"{n_inside} of {result.n}: {experts}"),
         ("weights inside", in_words(result.weights_inside)),
         ("truths beyond half of the half width", in_words(result.beyond_half)),
-        ("experts inside without the part from sub-optimality", in_words(result.inside_if_vouched)),
+        ("experts inside, if each is vouched for", in_words(result.inside_if_vouched)),
+        ("truths beyond half, if so", in_words(result.beyond_half_if_vouched)),
         ("runs that end with an answer", in_words(result.successes)),
         *((f"{name}: median, 90 %, largest", text) for name, text in spread.items()),
     ]
@@ -142,6 +142,7 @@ def to_json(result: Result) -> dict[str, Any]:
         "weights_inside": result.weights_inside._asdict(),
         "beyond_half": result.beyond_half._asdict(),
         "experts_inside_if_vouched": result.inside_if_vouched._asdict(),
+        "beyond_half_if_vouched": result.beyond_half_if_vouched._asdict(),
         "successes": result.successes._asdict(),
         "quantiles": {"levels": [0.5, 0.9, 1.0], **result.spreads},
         "weights": [

@@ -106,13 +106,13 @@ class Result:
     @property
     def inside_if_vouched(self) -> Share:
         """Experts whose weights would all lie inside had they been taken for optimal."""
-        told = [
-            np.abs(np.subtract(o["w"], o["w_expert"]))
-            <= np.add(o["parts"]["noise"], o["parts"]["solver"]) + ROUNDING
-            for o in self.recovered
-            if o.get("parts")
-        ]
-        return binomial_share(sum(bool(hit.all()) for hit in told), len(told))
+        told = self._strain_if_vouched
+        return binomial_share(int((told <= 1.0).all(axis=1).sum()), len(told))
+
+    @property
+    def beyond_half_if_vouched(self) -> Share:
+        """Truths beyond half of the half width had experts been taken for optimal."""
+        return pooled_share(self._strain_if_vouched > 0.5)
 
     @property
     def successes(self) -> Share:
@@ -193,6 +193,15 @@ class Result:
         """One part of all weights' half widths, of runs that tell it."""
         told = [o["parts"][name] for o in self.recovered if o.get("parts")]
         return np.array(told).ravel()
+
+    @property
+    def _strain_if_vouched(self) -> Array:
+        """Error over the half width without the part from sub-optimality, (N, K)."""
+        told = [o for o in self.recovered if o.get("parts")]
+        half = [np.add(o["parts"]["noise"], o["parts"]["solver"]) for o in told]
+        error = [np.abs(np.subtract(o["w"], o["w_expert"])) for o in told]
+        ratio = np.array(error) / np.maximum(half, ROUNDING)
+        return ratio.reshape(-1, len(self.objectives))
 
     def _column(self, name: str) -> Array:
         return np.array([o[name] for o in self.outcomes if o.get(name) is not None], dtype=float)
