@@ -14,7 +14,7 @@ from walking_irl.errors import InvalidInputError
 
 FRAME_MS = 40
 """Between two frames; GIF counts in hundredths of a second."""
-CYCLES = 3
+CYCLES = 1
 """After which it starts again; the floor then jumps, the walker does not."""
 
 
