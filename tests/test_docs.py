@@ -33,6 +33,15 @@ def test_every_block_of_the_pages_is_of_a_kind_that_is_tested_or_included():
     assert kinds - NOT_RUN == {"python", "console"}
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: str(p.relative_to(DOCS)))
+def test_a_displayed_formula_is_a_paragraph_of_its_own(page):
+    """Within a paragraph MyST takes its dollars for those of two inline formulas."""
+    lines = ["", *page.read_text().splitlines(), ""]
+    for i, line in enumerate(lines):
+        if line.strip().startswith("$$") and line.strip().endswith("$$") and len(line.strip()) > 2:
+            assert not lines[i - 1].strip() and not lines[i + 1].strip(), line
+
+
 @pytest.mark.parametrize("code", blocks("python"))
 def test_a_code_block_of_the_pages_runs(code, tmp_path, monkeypatch):
     for name in ("gymnasium", "mo_gymnasium"):
