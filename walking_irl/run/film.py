@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -37,20 +38,25 @@ class Film(NamedTuple):
         return None if self.world is None else self.world.motion(policy, w)
 
 
-@contextmanager
-def film(problem: Problem, path: Path) -> Iterator[Film]:
-    """Record a run; the file appears when the block ends, also after an error."""
+def experiment_of(problem: Problem) -> Experiment:
+    """What a recording knows of a problem, by whatever method it is solved."""
     setup, shown = problem.setup, problem.demonstration
-    world = world_of(problem.domain, shown)
-    experiment = Experiment(
+    return Experiment(
         domain=setup.domain,
         objectives=problem.objectives,
         expert=shown.expert,
-        centre=setup.centre,
-        mode=setup.mode,
         seed=setup.drawn_from,
         truth=shown.truth,
         question=problem.domain.question,
+    )
+
+
+@contextmanager
+def film(problem: Problem, path: Path) -> Iterator[Film]:
+    """Record a run; the file appears when the block ends, also after an error."""
+    world = world_of(problem.domain, problem.demonstration)
+    experiment = replace(
+        experiment_of(problem), centre=problem.setup.centre, mode=problem.setup.mode
     )
     with Recorder(path, experiment, None if world is None else world.view) as recorder:
         yield Film(recorder, world)

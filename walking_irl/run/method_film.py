@@ -10,11 +10,11 @@ import numpy as np
 
 from walking_irl.arrays import Array
 from walking_irl.baselines.registry import METHODS
-from walking_irl.recording.experiment import Experiment
 from walking_irl.recording.method import Found
 from walking_irl.recording.method_recorder import MethodRecorder
 from walking_irl.recording.views.registry import World, world_of
 from walking_irl.run.by_method import MethodReport, scaled
+from walking_irl.run.film import experiment_of
 
 
 def record_report(report: MethodReport, path: Path) -> None:
@@ -24,18 +24,9 @@ def record_report(report: MethodReport, path: Path) -> None:
         RecordingError: If it cannot be written.
     """
     problem = report.problem
-    setup, shown = problem.setup, problem.demonstration
-    world = world_of(problem.domain, shown)
-    experiment = Experiment(
-        domain=setup.domain,
-        objectives=problem.objectives,
-        expert=shown.expert,
-        seed=setup.drawn_from,
-        truth=shown.truth,
-        question=problem.domain.question,
-    )
+    world = world_of(problem.domain, problem.demonstration)
     view = None if world is None else world.view
-    with MethodRecorder(path, experiment, found_of(report), view) as recorder:
+    with MethodRecorder(path, experiment_of(problem), found_of(report), view) as recorder:
         if world is None:
             recorder.play(None)
         else:
