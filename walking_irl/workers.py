@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor
@@ -27,11 +28,20 @@ def run_tasks(
     return [f.result() for f in [executor.submit(function, *task) for task in tasks]]
 
 
+def can_be_copied() -> bool:
+    """Whether this process may be copied as it is: on Linux, as long as it has one thread."""
+    return sys.platform == "linux" and len(os.listdir("/proc/self/task")) == 1
+
+
 @contextmanager
-def workers() -> Iterator[Executor]:
+def workers(*, copied: bool = False) -> Iterator[Executor]:
     """A process pool of the machine's cores; an interrupt reaches this process only.
 
     The pool's processes end with this one, however it ends.
+
+    Args:
+        copied: Whether its processes begin as copies of this one, where that is safe: at once, with
+            all that is loaded. Others load everything anew, which takes a second of each.
 
     Raises:
         InvalidInputError: If its processes cannot start, since they run the caller's script again.
@@ -39,11 +49,8 @@ def workers() -> Iterator[Executor]:
     if getattr(current_process(), "_inheriting", False):  # a new process runs the script
         os._exit(1)  # without 150 lines of stack traces; the parent says it in one sentence
     count = os.cpu_count() or 1
-    pool = ProcessPoolExecutor(
-        count,
-        mp_context=get_context("spawn"),
-        initializer=_begin,
-    )
+    context = get_context("fork" if copied and can_be_copied() else "spawn")
+    pool = ProcessPoolExecutor(count, mp_context=context, initializer=_begin)
     try:
         with _interrupts_blocked():  # each starts a process, which inherits the blocked signal
             started = [pool.submit(os.getpid) for _ in range(count)]
@@ -67,6 +74,7 @@ def workers() -> Iterator[Executor]:
 def _begin() -> None:
     """In a new process: leave interrupts to the parent, and do not outlive it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # a copy would raise what the parent raises
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 

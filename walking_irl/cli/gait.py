@@ -58,7 +58,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
     if not (np.isfinite(args.seconds) and args.seconds > 0):
         raise InvalidInputError(f"seconds must be a positive number, got {args.seconds}")
     domain, w = asked_walker(args, console)
-    with workers() as executor:
+    with workers(copied=True) as executor:
         response = domain.forward(w, executor)
     found = response.policy
     content = {

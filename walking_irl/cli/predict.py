@@ -53,7 +53,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
         raise InvalidInputError(f"speed must be a positive number, got {args.speed}")
     around = Surroundings(args.slope, args.load)
     domain, w = asked_walker(args, console)
-    with workers() as executor:
+    with workers(copied=True) as executor:
         level = predict(domain.spec, w, Surroundings(), executor=executor)
         there = predict(domain.spec, w, around, args.speed, executor, level=level)
     write_gait_files(args, there.spec.walker, there.gait)

@@ -22,7 +22,7 @@ def add_scheduler(group: Any) -> None:
 
 def workers_for(domain: Domain) -> AbstractContextManager[Executor | None]:
     """Worker processes, or none where a domain's solves take less time than to start them."""
-    return workers() if domain.defaults.needs_workers else nullcontext()
+    return workers(copied=True) if domain.defaults.needs_workers else nullcontext()
 
 
 @contextmanager
@@ -33,7 +33,7 @@ def side_by_side(scheduler: str | None) -> Iterator[Executor]:
         InvalidInputError: If there is no such scheduler, or what it needs is not installed.
     """
     if scheduler is None:
-        with workers() as executor:
+        with workers(copied=True) as executor:
             yield executor
         return
     from walking_irl.experiments.cluster import cluster

@@ -89,7 +89,7 @@ def run(args: argparse.Namespace, given: dict[str, Any], console: Console) -> in
     options = options_of(args)
     people = [_read(paths, HUMANOID.walker, options) for paths in args.walk]
     answers = []
-    with workers() as executor:
+    with workers(copied=True) as executor:
         for person, trials in people:
             answers.append(_explain(person, trials, args, console, executor))
     if args.record is not None:

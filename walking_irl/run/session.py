@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
 from contextlib import ExitStack, suppress
 from dataclasses import replace
+from importlib import import_module
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
@@ -59,6 +61,8 @@ def run(
     watch = Stopwatch()
     if setup.record is not None:
         check_writable(setup.record, RecordingError)
+        if executor is not None:
+            threading.Thread(target=_load_film).start()
     with watch.part("expert"):
         problem = _problem(setup, resumed, executor, on_step)
     on_expert(problem)
@@ -79,6 +83,12 @@ def run(
             report.recovered_mu = problem.learner.forward(report.w).mu
     report.seconds = watch.finish()
     return report
+
+
+def _load_film() -> None:
+    """What recordings need takes half a second to load: meanwhile others look for the expert."""
+    with suppress(Exception):  # whoever needs it says what is wrong
+        import_module("walking_irl.run.film")
 
 
 def _problem(

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from walking_irl.domains.humanoid.body.load import load_walker
-from walking_irl.domains.humanoid.closed_loop.disturbance import Push
+from walking_irl.domains.humanoid.closed_loop.disturbance import Disturbance, Push
 from walking_irl.domains.humanoid.closed_loop.policy import TrackingPolicy, tracking_policy
-from walking_irl.domains.humanoid.closed_loop.rollout import averaged_gait, rollout
+from walking_irl.domains.humanoid.closed_loop.rollout import Course, averaged_gait, rollout
 from walking_irl.domains.humanoid.costs.stack import cost_stack
 from walking_irl.domains.humanoid.gait.gait import Gait
 from walking_irl.domains.humanoid.gait.library import load_gaits, load_library
@@ -124,7 +124,7 @@ def test_refinement_passes_through_the_knots(policy, fine_policy):
 
 def test_average_of_undisturbed_walks_is_the_gait(walker, policy):
     walk = rollout(walker, policy, cycles=5)
-    mean = averaged_gait(walker, [walk], policy)
+    mean = averaged_gait(walker, [walk], GAITS["reference"])
     np.testing.assert_allclose(mean.q, GAITS["reference"].q, atol=1e-3)
     assert mean.step_length == pytest.approx(GAITS["reference"].step_length, abs=1e-4)
 
@@ -132,8 +132,8 @@ def test_average_of_undisturbed_walks_is_the_gait(walker, policy):
 def test_average_of_noisy_walks_comes_back_to_the_gait(walker, policy):
     rng = np.random.default_rng(4)
     walks = [rollout(walker, policy, cycles=5, rng=rng, kicks=0.02) for _ in range(4)]
-    one = averaged_gait(walker, walks[:1], policy)
-    mean = averaged_gait(walker, walks, policy)
+    one = averaged_gait(walker, walks[:1], GAITS["reference"])
+    mean = averaged_gait(walker, walks, GAITS["reference"])
     reference = GAITS["reference"].q
 
     def error(gait: Gait) -> float:
@@ -153,7 +153,7 @@ def test_nonsense_is_refused(walker, policy):
         rollout(walker, policy, cycles=0)
     walk = rollout(walker, policy, cycles=2)
     with pytest.raises(InvalidInputError, match="more than 2 whole gait cycles"):
-        averaged_gait(walker, [walk], policy)
+        averaged_gait(walker, [walk], GAITS["reference"])
 
 
 @pytest.mark.slow
@@ -187,3 +187,14 @@ def test_no_shipped_gait_asks_a_motor_for_more_than_it_gives(body):
     for name, gait in load_gaits(body).items():
         torque = tracking_policy(walker, gait).reference.u
         assert (torque > 0.75 * low).all() and (torque < 0.75 * high).all(), name
+
+
+@pytest.mark.parametrize("disturbance", [Disturbance(velocity_noise=0.02), Disturbance(kicks=0.02)])
+def test_walks_of_a_course_do_not_depend_on_those_before(walker, policy, disturbance):
+    course = Course(walker, policy, disturbance)
+    course.walk(np.random.default_rng(1), cycles=2)
+    again = course.walk(np.random.default_rng(2), cycles=2)
+    noise = {"velocity_noise": disturbance.velocity_noise, "kicks": disturbance.kicks}
+    alone = rollout(walker, policy, cycles=2, rng=np.random.default_rng(2), **noise)
+    for name, value in vars(alone).items():
+        np.testing.assert_array_equal(getattr(again, name), value)

@@ -24,7 +24,6 @@ from walking_irl.domains.contract import (
     settings,
 )
 from walking_irl.domains.humanoid.body.anatomy import Walker
-from walking_irl.domains.humanoid.closed_loop.policy import tracking_policy
 from walking_irl.domains.humanoid.closed_loop.rollout import averaged_gait
 from walking_irl.domains.humanoid.closed_loop.trials import MANY, Measurement, Trials, measure
 from walking_irl.domains.humanoid.costs.defaults import DEFAULT_COSTS, Costs
@@ -173,8 +172,7 @@ class Humanoid:
         if trials.rollouts == 0:
             return Demonstration(exact_expert(gait, optimum.total_costs), gait, truth)
         measured = measure(self.spec, gait, trials, own_rng, executor)
-        policy = tracking_policy(self.walker, gait)
-        shown = averaged_gait(self.walker, measured.rollouts, policy, skip=trials.skip)
+        shown = averaged_gait(self.walker, measured.rollouts, gait, skip=trials.skip)
         return Demonstration(expert_from(measured, shown), gait, truth, measured.rollouts)
 
     def _suboptimal(

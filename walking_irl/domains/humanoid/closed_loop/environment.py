@@ -24,6 +24,7 @@ from walking_irl.domains.humanoid.closed_loop.disturbance import (
     Push,
 )
 from walking_irl.domains.humanoid.closed_loop.progress import FALL_METRES, price_of_progress
+from walking_irl.domains.humanoid.closed_loop.step import Step, Views
 from walking_irl.domains.humanoid.costs.base import REFERENCE_SPEED, Channels
 from walking_irl.domains.humanoid.costs.defaults import DEFAULT_COSTS, Costs
 from walking_irl.domains.humanoid.costs.stack import cost_stack
@@ -47,16 +48,6 @@ class Start(NamedTuple):
     timestep: float
     period: float
     speed: float
-
-
-class Step(NamedTuple):
-    """One step of a walk: state and sensors at its start, torque and acceleration during it."""
-
-    q: Array
-    v: Array
-    a: Array
-    u: Array
-    sensors: Array
 
 
 class WalkTask(control.Task):  # type: ignore[misc]
@@ -105,6 +96,7 @@ class WalkTask(control.Task):  # type: ignore[misc]
         self._pitch = walker.joints.index("root_pitch")
         self._pelvis = walker.model.body("pelvis").id
         self._kick_at = -1
+        self._views: Views
 
     def _forget(self) -> None:
         """Nothing has happened yet."""
@@ -119,39 +111,40 @@ class WalkTask(control.Task):  # type: ignore[misc]
         data.qpos[:], data.qvel[:] = self.start.q, self.start.v
         if self.disturbance.velocity_noise > 0:
             self._kick(data, self.disturbance.velocity_noise)
+        self._views = Views.of(data.ptr)
         self._forget()
         self._kick_at = self.random.randint(self.steps_per_cycle)
 
     def before_step(self, action: Array, physics: WalkerPhysics) -> None:
         """Set the torques and note the state; a push acts here."""
-        data = physics.data.ptr
-        data.ctrl[:] = action
+        views = self._views
+        views.ctrl[:] = action
         if self.disturbance.push is not None:
-            self._push(data, self.disturbance.push)
+            self._push(physics.data.ptr, self.disturbance.push)
         if self._steps_per_control > 1:  # else force sensors would be those of the last substep
-            mujoco.mj_forward(physics.model.ptr, data)
-        self._state = data.qpos.copy(), data.qvel.copy(), data.sensordata.copy()
+            mujoco.mj_forward(physics.model.ptr, physics.data.ptr)
+        self._state = views.q.copy(), views.v.copy(), views.sensors.copy()
 
-    def after_step(self, physics: WalkerPhysics) -> None:
+    def after_step(self, physics: WalkerPhysics) -> Step:
         """Record the step, compute the features of the one before, and kick for the next."""
-        data = physics.data.ptr
+        views = self._views
         q, v, sensors = self._state
         if self._steps_per_control == 1:  # force and acceleration are known only now
-            now = data.sensordata
             for late in self._late:
-                sensors[late] = now[late]
-        a = (data.qvel - v) / self.control_timestep
-        step = Step(q, v, a, data.actuator_force.copy(), sensors)
+                sensors[late] = views.sensors[late]
+        a = (views.v - v) / self.control_timestep
+        step = Step(q, v, a, views.torque.copy(), sensors)
         if self.weights is not None and self.last is not None:
             self._evaluate(self.last, step)
         self.last = step
         self.n_steps += 1
         if self.disturbance.kicks > 0:
             if self.n_steps % self.steps_per_cycle == self._kick_at:
-                self._kick(data, self.disturbance.kicks)
-                mujoco.mj_step1(physics.model.ptr, data)
+                self._kick(physics.data.ptr, self.disturbance.kicks)
+                mujoco.mj_step1(physics.model.ptr, physics.data.ptr)
             if self.n_steps % self.steps_per_cycle == 0:
                 self._kick_at = self.random.randint(self.steps_per_cycle)
+        return step
 
     def get_reward(self, physics: WalkerPhysics) -> float:
         """Price x progress - w.costs of the last complete step; without a price, w.phi."""
@@ -170,7 +163,7 @@ class WalkTask(control.Task):  # type: ignore[misc]
 
     def has_fallen(self, physics: WalkerPhysics) -> bool:
         """Whether the pelvis is too low or too far tilted, or the state is not finite."""
-        q = physics.data.ptr.qpos.tolist()
+        q = self._views.q.tolist()
         upright = q[self._height] > -FALL_DROP and abs(q[self._pitch]) < FALL_PITCH
         return not (upright and math.isfinite(sum(q)))
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from dm_control.rl.control import Environment, PhysicsError
+from dm_control.rl.control import PhysicsError
 
 from walking_irl.domains.humanoid.body.anatomy import Walker
+from walking_irl.domains.humanoid.body.physics import WalkerPhysics
 from walking_irl.domains.humanoid.closed_loop.disturbance import Disturbance, Push
-from walking_irl.domains.humanoid.closed_loop.environment import Start, Step, environment
+from walking_irl.domains.humanoid.closed_loop.environment import Start, WalkTask, environment
 from walking_irl.domains.humanoid.closed_loop.policy import TrackingPolicy
+from walking_irl.domains.humanoid.closed_loop.step import Step
 from walking_irl.domains.humanoid.gait.cycles import mirror_average
 from walking_irl.domains.humanoid.gait.gait import Gait
 from walking_irl.errors import FallError, InvalidInputError
@@ -49,34 +51,91 @@ def rollout(
         FallError: If the walker falls.
         InvalidInputError: If the arguments contradict each other.
     """
-    n_samples = 1 + _n_steps(policy, cycles, seconds)
     if rng is None and (velocity_noise > 0 or kicks > 0):
         raise InvalidInputError("noise and kicks need a random generator: give rng")
-    reference = policy.reference
-    env = environment(
-        walker,
-        Start(
+    course = Course(walker, policy, Disturbance(velocity_noise, kicks, push))
+    return course.walk(
+        rng or np.random.default_rng(0),
+        cycles=cycles,
+        seconds=seconds,
+        raise_on_fall=raise_on_fall,
+    )
+
+
+class Course:
+    """Where a walker walks a gait again and again, each time from its first knot.
+
+    Args:
+        walker: Who walks.
+        policy: The controller.
+        disturbance: Noise, kicks and pushes.
+    """
+
+    def __init__(self, walker: Walker, policy: TrackingPolicy, disturbance: Disturbance) -> None:
+        self.walker, self.policy = walker, policy
+        reference = policy.reference
+        start = Start(
             reference.q[0],
             reference.v[0],
             policy.timestep,
             policy.period,
             policy.stride / policy.period,
-        ),
-        rng=rng or np.random.default_rng(0),
-        disturbance=Disturbance(velocity_noise, kicks, push),
-    )
-    steps, fell = _walk(env, policy, n_samples)
-    if fell and raise_on_fall:
-        raise _fall(walker, env, len(steps) * policy.timestep)
-    parts = zip(*steps, strict=True)
-    q, v, a, u, sensors = (np.concatenate(part).reshape(len(steps), -1) for part in parts)
-    return Rollout(policy.timestep * np.arange(len(steps), dtype=float), q, v, a, u, sensors)
+        )
+        rng = np.random.default_rng(0)
+        self._env = environment(walker, start, rng=rng, disturbance=disturbance)
+        self._task: WalkTask = self._env.task
+        self._physics: WalkerPhysics = self._env.physics
+
+    def walk(
+        self,
+        rng: np.random.Generator,
+        *,
+        cycles: int | None = None,
+        seconds: float | None = None,
+        raise_on_fall: bool = True,
+    ) -> Rollout:
+        """One walk; see :func:`rollout`."""
+        n_samples = 1 + _n_steps(self.policy, cycles, seconds)
+        steps, fell = self._steps(rng, n_samples)
+        timestep = self.policy.timestep
+        if fell and raise_on_fall:
+            raise self._fall(len(steps) * timestep)
+        parts = zip(*steps, strict=True)
+        q, v, a, u, sensors = (np.concatenate(part).reshape(len(steps), -1) for part in parts)
+        return Rollout(timestep * np.arange(len(steps), dtype=float), q, v, a, u, sensors)
+
+    def _steps(self, rng: np.random.Generator, n_samples: int) -> tuple[list[Step], bool]:
+        """Steps walked, and whether the walker fell; nobody observes them, nobody is rewarded."""
+        steps: list[Step] = []
+        task, physics, policy = self._task, self._physics, self.policy
+        task.random = np.random.RandomState(rng.bit_generator)
+        self._env.reset()
+        q, v = physics.data.ptr.qpos, physics.data.ptr.qvel
+        for k in range(n_samples):
+            task.before_step(policy.torque(k, q, v), physics)
+            try:
+                physics.step()
+            except PhysicsError:
+                return steps, True
+            steps.append(task.after_step(physics))
+            if task.has_fallen(physics):
+                return steps, True
+        return steps, False
+
+    def _fall(self, time: float) -> FallError:
+        q, joints = self._physics.data.ptr.qpos, self.walker.joints
+        height, pitch = (q[joints.index(j)] for j in ("root_z", "root_pitch"))
+        return FallError(
+            f"the walker fell after {time:.2f} s: pelvis {100 * -height:.0f} cm below standing, "
+            f"pitched by {np.degrees(pitch):.0f} degrees",
+            time,
+        )
 
 
 def averaged_gait(
     walker: Walker,
     rollouts: Sequence[Rollout],
-    policy: TrackingPolicy,
+    gait: Gait,
     *,
     skip: int = 2,
     substeps: int = 1,
@@ -85,17 +144,15 @@ def averaged_gait(
 
     Args:
         walker: Who walked.
-        rollouts: Walks of ``policy``, whole from the first step.
-        policy: Whose clock divides the walks into cycles.
+        rollouts: Walks of ``gait``, whole from its first knot.
+        gait: Whose clock divides the walks into cycles.
         skip: First cycles of every walk that are left out, until it has settled.
         substeps: Every so many steps of the simulation is a knot of the gait.
 
     Raises:
-        InvalidInputError: If no whole cycle remains, or cycles do not divide into knots.
+        InvalidInputError: If no whole cycle remains.
     """
-    K = policy.steps_per_cycle
-    if K % (2 * substeps):
-        raise InvalidInputError(f"{K} steps a cycle do not divide by 2 x {substeps} substeps")
+    K = 2 * gait.n_knots * substeps
     pieces, strides = [], []
     for walk in rollouts:
         for c in range(skip, (len(walk.q) - 1) // K):
@@ -106,7 +163,7 @@ def averaged_gait(
     if not pieces:
         raise InvalidInputError(f"no walk has more than {skip} whole gait cycles")
     step_length = float(np.mean(strides)) / 2
-    return mirror_average(walker, np.mean(pieces, 0), step_length, policy.period / 2)
+    return mirror_average(walker, np.mean(pieces, 0), step_length, gait.half_period)
 
 
 def _n_steps(policy: TrackingPolicy, cycles: int | None, seconds: float | None) -> int:
@@ -116,30 +173,3 @@ def _n_steps(policy: TrackingPolicy, cycles: int | None, seconds: float | None) 
     if n < 1:
         raise InvalidInputError(f"a walk needs at least one step, got {cycles or seconds}")
     return n
-
-
-def _walk(env: Environment, policy: TrackingPolicy, n_samples: int) -> tuple[list[Step], bool]:
-    """Steps walked, and whether the walker fell."""
-    steps: list[Step] = []
-    env.reset()
-    data, task = env.physics.data.ptr, env.task
-    q, v = data.qpos, data.qvel
-    for k in range(n_samples):
-        try:
-            ends = env.step(policy.torque(k, q, v)).last()
-        except PhysicsError:
-            return steps, True
-        steps.append(task.last)
-        if ends:
-            return steps, True
-    return steps, False
-
-
-def _fall(walker: Walker, env: Environment, time: float) -> FallError:
-    q = env.physics.data.ptr.qpos
-    height, pitch = (q[walker.joints.index(j)] for j in ("root_z", "root_pitch"))
-    return FallError(
-        f"the walker fell after {time:.2f} s: pelvis {100 * -height:.0f} cm below standing, "
-        f"pitched by {np.degrees(pitch):.0f} degrees",
-        time,
-    )

@@ -10,8 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from walking_irl.arrays import Array
+from walking_irl.domains.humanoid.closed_loop.disturbance import Disturbance
 from walking_irl.domains.humanoid.closed_loop.policy import tracking_policy
-from walking_irl.domains.humanoid.closed_loop.rollout import rollout
+from walking_irl.domains.humanoid.closed_loop.rollout import Course
 from walking_irl.domains.humanoid.gait.gait import Gait
 from walking_irl.domains.humanoid.spec import WalkerSpec
 from walking_irl.errors import InvalidInputError
@@ -108,17 +109,12 @@ def walk(
     """Trajectories of one gait, one per seed, and their mean total costs per cycle, (n, K)."""
     walker, stack = spec.walker, spec.stack
     policy = tracking_policy(walker, gait)
-    is_kicked = trials.disturbance == "kicks"
+    noise = (0.0, trials.noise) if trials.disturbance == "kicks" else (trials.noise, 0.0)
+    course = Course(walker, policy, Disturbance(*noise))
     walks, costs = [], []
     for seed in seeds:
-        walked = rollout(
-            walker,
-            policy,
-            cycles=trials.skip + trials.cycles,
-            rng=np.random.default_rng(int(seed)),
-            velocity_noise=0.0 if is_kicked else trials.noise,
-            kicks=trials.noise if is_kicked else 0.0,
-        )
+        rng = np.random.default_rng(int(seed))
+        walked = course.walk(rng, cycles=trials.skip + trials.cycles)
         walks.append(walked)
         steps = policy.steps_per_cycle
         cycles = [
