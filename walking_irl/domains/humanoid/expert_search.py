@@ -1,12 +1,14 @@
 """The expert: the best gait for ground-truth weights, and what is recorded of it.
 
 Newton's method finds the minimum of a basin at once, so the price is the search for the basin: from
-the known gaits that are cheapest under the weights and from the reference, all at a low root
-penalty; the best basins go to the full one. A still lower penalty first lets a gait leave its basin
-for a better one, or a worse one: both are tried. Detours over the optimal gaits of neighbouring
-weights then find what a learner would find, and known gaits that are still cheaper are finished
-themselves. An optimum that is no smooth minimum sits on a contact jump: it is perturbed and solved
-again.
+the known gaits that are cheapest under the weights, all at a low root penalty. A still lower
+penalty first lets a gait leave its basin for a better one, or a worse one: both are tried. Where
+between two knots a foot lands and leaves the ground makes basins of their own, up to some
+hundredths of the cost apart, that no small step joins: the best gaits are shifted by half a knot,
+as long as that helps. The best basins go to the full penalty. Detours over the optimal gaits of
+neighbouring weights then find what a learner would find, and known gaits that are still cheaper are
+finished themselves. An optimum that is no smooth minimum sits on a contact jump: it is perturbed
+and solved again.
 """
 
 from __future__ import annotations
@@ -25,30 +27,33 @@ from walking_irl.domains.humanoid.learner import (
     polish,
     solver_for,
 )
+from walking_irl.domains.humanoid.optimiser.perturbation import shifted
 from walking_irl.domains.humanoid.optimiser.solver import Solution
 from walking_irl.domains.humanoid.optimiser.stages import Stage, stage
 from walking_irl.domains.humanoid.spec import WalkerSpec
 from walking_irl.workers import run_tasks
 
 APPROACH = (stage(1e4, 25, 1e-4),)
-SOFTLY = (stage(1e3, 25, 1e-3), *APPROACH)
+SOFTLY = (stage(1e3, 8, 1e-3), *APPROACH)
 """From a gait of other weights, first through a penalty at which it may leave its basin. Tolerances
 can be rough: the step that shows a decrement leaves one of about its square."""
-FINISH = (stage(1e6, 60, 1e-11),)
+FINISH = (stage(1e6, 25, 1e-11),)
 THERE, BACK = (stage(1e6, 15, 1e-3),), (stage(1e6, 25, 1e-4),)
 """A detour to a gait of neighbouring weights, and back; only the best is finished."""
 NEAREST = 4
 """Known gaits from which a search starts softly, the cheapest under the weights; the first of them
-and the reference also keep their basins."""
+also keeps its basin."""
+SHIFT, MAX_SHIFTS, SHIFTED = 0.5, 6, 2
+"""By how many knots the best gaits are shifted, how often at most, and how many of them."""
 DETOUR = 0.05
 """How far detours go towards each corner of the simplex."""
 MAX_DETOURS = 3
 """Rounds of detours, as long as one finds a better gait."""
-BASINS = 3
+BASINS = 2
 """Most basins that are taken to the full root penalty."""
 FINISH_HOPS = tuple(np.deg2rad([[0.005, 0.1], [0.3, 1.0], [0.1, 0.3]]).tolist())
 """Amplitudes of the perturbations of an optimum that is no smooth minimum, by round [rad]."""
-SAME_BASIN, RIVAL_BASIN = 2e-5, 5e-3
+SAME_BASIN, RIVAL_BASIN = 5e-6, 1e-3
 """Relative cost differences below which gaits are the same, and above which a basin is lost."""
 SMOOTH = 1e-8
 """Decrement of a demonstration on which every derivative can be trusted."""
@@ -107,6 +112,9 @@ class _Search:
     def cost(self, s: Solution) -> float:
         return float(s.total_costs @ self.w)
 
+    def shifted(self, s: Solution, knots: float) -> Array:
+        return shifted(self.spec.walker, s.x, knots)
+
     def decrement(self, s: Solution) -> float:
         return self.solver.decrement(self.w, self.solver.linearise(s.x), s.root)
 
@@ -134,12 +142,11 @@ def best_gait(
     job = _Search(spec, w, executor)
     known = known_gaits(spec)
     near = [s.x for s in sorted(known, key=lambda s: float(s.total_costs @ w))[:NEAREST]]
-    starts = [(x, SOFTLY) for x in near] + [(near[0], APPROACH)]
-    if near[0] is not known[0].x:
-        starts.append((known[0].x, APPROACH))
+    starts = [(x, SOFTLY) for x in reversed(near)] + [(near[0], APPROACH)]  # the longest first
     jobs: list[Job] = [(x, stages, job.solver.dual(x)) for x, stages in starts]
-    found = sorted(job.run([*jobs, *((x, APPROACH, None) for x in also)]), key=job.search_cost)
-    raised = job.run([(s.x, FINISH, s.root) for s in _basins(found, job)])
+    found = job.run([*jobs, *((x, APPROACH, None) for x in also)])
+    found += _shifted(job, found)
+    raised = job.run([(s.x, FINISH, s.root) for s in _basins(job, found, BASINS, RIVAL_BASIN)])
     for _ in range(MAX_DETOURS):
         best = min(raised, key=job.cost)
         other = min(job.detours(best), key=job.cost)
@@ -150,6 +157,23 @@ def best_gait(
     return OptimalGait(
         chosen.x, chosen.total_costs, job.decrement(chosen), job.starts, job.iterations
     )
+
+
+def _shifted(job: _Search, found: Sequence[Solution]) -> list[Solution]:
+    """Solutions from the best gaits, shifted; on in the same direction where one is better."""
+    ways = [(s, d) for s in _basins(job, found, SHIFTED) for d in (-SHIFT, SHIFT)]
+    out: list[Solution] = []
+    for _ in range(MAX_SHIFTS):
+        hops = job.run([(job.shifted(s, d), APPROACH, None) for s, d in ways])
+        out += hops
+        ways = [
+            (hop, d)
+            for hop, (s, d) in zip(hops, ways, strict=True)
+            if job.search_cost(hop) < job.search_cost(s) * (1 - SAME_BASIN)
+        ]
+        if not ways:
+            break
+    return out
 
 
 def _cheaper(job: _Search, known: Sequence[Start], found: Sequence[Solution]) -> list[Solution]:
@@ -184,13 +208,15 @@ def _finish(job: _Search, found: list[Solution], rng: np.random.Generator) -> So
     return best
 
 
-def _basins(found: Sequence[Solution], job: _Search) -> list[Solution]:
-    """The best solution and the best of other basins that are nearly as good."""
-    basins = [found[0]]
-    for s in found[1:]:
-        ratio = job.search_cost(s) / job.search_cost(basins[-1])
-        if ratio > 1 + SAME_BASIN and job.search_cost(s) < job.search_cost(found[0]) * (
-            1 + RIVAL_BASIN
-        ):
+def _basins(
+    job: _Search, found: Sequence[Solution], most: int, rival: float = np.inf
+) -> list[Solution]:
+    """The best solutions of different basins, none dearer than the best by more than ``rival``."""
+    cost = job.search_cost
+    ordered = sorted(found, key=cost)
+    basins = ordered[:1]
+    for s in ordered[1:]:
+        is_other = cost(s) > cost(basins[-1]) * (1 + SAME_BASIN)
+        if is_other and cost(s) < cost(basins[0]) * (1 + rival):
             basins.append(s)
-    return basins[:BASINS]
+    return basins[:most]
