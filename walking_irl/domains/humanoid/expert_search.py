@@ -33,10 +33,12 @@ from walking_irl.domains.humanoid.optimiser.stages import Stage, stage
 from walking_irl.domains.humanoid.spec import WalkerSpec
 from walking_irl.workers import run_tasks
 
-APPROACH = (stage(1e4, 25, 1e-4),)
+APPROACH = (stage(1e4, 15, 1e-4),)
 SOFTLY = (stage(1e3, 8, 1e-3), *APPROACH)
 """From a gait of other weights, first through a penalty at which it may leave its basin. Tolerances
 can be rough: the step that shows a decrement leaves one of about its square."""
+RETURN = (stage(1e4, 25, 1e-4),)
+"""After a shift: to be judged by its costs, a gait must have arrived."""
 FINISH = (stage(1e6, 25, 1e-11),)
 THERE, BACK = (stage(1e6, 15, 1e-3),), (stage(1e6, 25, 1e-4),)
 """A detour to a gait of neighbouring weights, and back; only the best is finished."""
@@ -47,8 +49,8 @@ SHIFT, MAX_SHIFTS, SHIFTED = 0.5, 6, 2
 """By how many knots the best gaits are shifted, how often at most, and how many of them."""
 DETOUR = 0.05
 """How far detours go towards each corner of the simplex."""
-MAX_DETOURS = 3
-"""Rounds of detours, as long as one finds a better gait."""
+MAX_DETOURS, WORTH_MORE = 3, 1e-4
+"""Rounds of detours, as long as one finds a gait that is better by this share of the cost."""
 BASINS = 2
 """Most basins that are taken to the full root penalty."""
 FINISH_HOPS = tuple(np.deg2rad([[0.005, 0.1], [0.3, 1.0], [0.1, 0.3]]).tolist())
@@ -150,9 +152,12 @@ def best_gait(
     for _ in range(MAX_DETOURS):
         best = min(raised, key=job.cost)
         other = min(job.detours(best), key=job.cost)
-        if not job.cost(other) < job.cost(best) * (1 - SAME_BASIN):
+        gain = 1 - job.cost(other) / job.cost(best)
+        if not gain > SAME_BASIN:
             break
         raised += job.run([(other.x, FINISH, other.root)])
+        if not gain > WORTH_MORE:
+            break
     chosen = _finish(job, raised + _cheaper(job, known, raised), rng)
     return OptimalGait(
         chosen.x, chosen.total_costs, job.decrement(chosen), job.starts, job.iterations
@@ -164,7 +169,7 @@ def _shifted(job: _Search, found: Sequence[Solution]) -> list[Solution]:
     ways = [(s, d) for s in _basins(job, found, SHIFTED) for d in (-SHIFT, SHIFT)]
     out: list[Solution] = []
     for _ in range(MAX_SHIFTS):
-        hops = job.run([(job.shifted(s, d), APPROACH, None) for s, d in ways])
+        hops = job.run([(job.shifted(s, d), RETURN, None) for s, d in ways])
         out += hops
         ways = [
             (hop, d)
