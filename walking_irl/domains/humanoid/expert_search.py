@@ -91,6 +91,7 @@ class _Search:
         self.spec, self.w, self.executor = spec, w, executor
         self.solver = solver_for(spec)
         self.starts = self.iterations = 0
+        self._costs: dict[int, tuple[Solution, float]] = {}
 
     def run(self, jobs: Sequence[Job]) -> list[Solution]:
         tasks = [(self.spec, self.w, *job) for job in jobs]
@@ -109,7 +110,10 @@ class _Search:
         return found
 
     def search_cost(self, s: Solution) -> float:
-        return self.solver.problem.evaluate(s.x).total(self.w, APPROACH[0].penalty)
+        if id(s) not in self._costs:  # asked for again and again, and takes a millisecond
+            cost = self.solver.problem.evaluate(s.x).total(self.w, APPROACH[0].penalty)
+            self._costs[id(s)] = s, cost  # which keeps it alive, and its id its own
+        return self._costs[id(s)][1]
 
     def cost(self, s: Solution) -> float:
         return float(s.total_costs @ self.w)
