@@ -182,13 +182,25 @@ def figures(walker: Walker, gait: Gait) -> dict[str, Any]:
 
 
 def _temporal(c: Cycle) -> dict[str, float]:
-    both = (c.force > ON_GROUND).all(1)
     return {
         "cadence": 60 / c.gait.half_period,
         "step_length": c.gait.step_length,
-        "stance": 100 * c.n_stance / len(c.q),
-        "double_support": 100 * both.mean(),
+        "stance": 100 * _share_above(c.force[:, :1]),
+        "double_support": 100 * _share_above(c.force),
     }
+
+
+def _share_above(force: Array) -> float:
+    """Share of the cycle in which all forces exceed ON_GROUND, linear between the samples.
+
+    Counting samples instead would make double support jump by 2.5 % of the cycle.
+    """
+    a, b = force - ON_GROUND, np.roll(force, -1, 0) - ON_GROUND
+    with np.errstate(divide="ignore", invalid="ignore"):
+        crossing = np.where((a > 0) != (b > 0), a / (a - b), 0.0)
+    start = np.where(a > 0, 0.0, np.where(b > 0, crossing, 1.0)).max(1)
+    end = np.where(b > 0, 1.0, np.where(a > 0, crossing, 0.0)).min(1)
+    return float(np.maximum(end - start, 0).mean())
 
 
 def _vertical_force(c: Cycle) -> dict[str, float]:
