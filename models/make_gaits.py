@@ -25,6 +25,7 @@ from walking_irl.domains.humanoid.gait.gait import Gait
 from walking_irl.domains.humanoid.gait.library import PREFIX, load_gaits, own_gaits
 from walking_irl.domains.humanoid.gait.norm_curves import norm_set
 from walking_irl.domains.humanoid.learner import polish, solver_for
+from walking_irl.domains.humanoid.optimiser.perturbation import shifted
 from walking_irl.domains.humanoid.optimiser.solver import Solution
 from walking_irl.domains.humanoid.optimiser.stages import Stage, stage
 from walking_irl.domains.humanoid.population import typical_weights
@@ -51,7 +52,11 @@ RELEASED = (stage(1e4, 60, 1e-5),)
 SEARCH = (stage(1e4, 60, 1e-6),)
 FINISH = (stage(1e5, 60, 1e-6), stage(1e6, 100, 1e-11))
 HOPS = {"reference": 16, "other": 4}
+SHIFTS = (-1.0, -0.5, 0.5, 1.0)
+"""Shifts of a gait's knots: which instants are knots decides how a foot's contact is sampled."""
 AMPLITUDES = np.deg2rad([1.0, 3.0])
+GAIN = 1e-7
+"""By which share a gait must be cheaper to count as another one."""
 SMOOTH = 1e-8
 """Decrement of a smooth minimum: a gait on a contact jump is shaken off it."""
 HAIRS = np.deg2rad([0.005, 0.02, 0.1, 0.3])
@@ -161,11 +166,21 @@ class Maker:
         return min(found, key=lambda y: self.cost(w, y, penalty))
 
     def exchange(self, w: Array, gaits: Collection[Array]) -> Array:
-        """The best gait for ``w`` near any of the four known ones that are cheapest under it."""
+        """The best gait for ``w`` near the four known ones that are cheapest under it.
+
+        Then near the best one with its knots shifted, for as long as that helps.
+        """
         penalty = FINISH[-1].penalty
         near = sorted(gaits, key=lambda y: self.cost(w, y, penalty))[:4]
         found = self.run(w, near, SEARCH + FINISH) + self.run(w, near[:2], FINISH)
-        return min([near[0], *found], key=lambda y: self.cost(w, y, penalty))
+        best = min([near[0], *found], key=lambda y: self.cost(w, y, penalty))
+        while True:
+            moved = [shifted(self.spec.walker, best, knots) for knots in SHIFTS]
+            found = self.run(w, moved, SEARCH + FINISH)
+            other = min(found, key=lambda y: self.cost(w, y, penalty), default=best)
+            if self.cost(w, other, penalty) > self.cost(w, best, penalty) * (1 - GAIN):
+                return best
+            best = other
 
     def make(self, start: Array) -> dict[str, Array]:
         """Gaits of the body by name, from a walk."""

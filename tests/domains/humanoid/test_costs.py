@@ -101,7 +101,7 @@ def test_smoothness_counts_the_rate_of_torques_by_strength():
     i, h, step = walker.joints.index("knee_r") - walker.n_root, 0.01, 3.0
     mean = (walker.strength_plus[i] + walker.strength_minus[i]) / 2
     found = rate.residual(np.zeros(walker.model.nu), np.full(walker.model.nu, step), h)[i]
-    assert found == pytest.approx(step / h / (5 * mean))
+    assert found == pytest.approx(step / h / (Smoothness().rate * mean))
 
 
 def test_second_partials_of_skidding_are_those_of_a_logistic_function(channels):

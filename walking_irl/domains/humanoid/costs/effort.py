@@ -32,11 +32,11 @@ class Effort(Cost):
 
     name: str = "effort"
     unit: str = "1"
-    scale: float = 0.29
+    scale: float = 0.145
     meaning: str = "Squared torque of muscle and tendon relative to the strength of its direction."
     formula: str = "|(tau - k3 (q - ref)^3) / strength|^2"
-    reference: float | None = 1.282
-    planar_reference: float | None = 1.418
+    reference: float | None = 4.898
+    planar_reference: float | None = 1.094
     switch: float = 10.0
 
     def terms(self, walker: Walker) -> Sequence[Term]:

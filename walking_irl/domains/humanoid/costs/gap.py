@@ -26,10 +26,10 @@ class LegGap(SharedCost):
     meaning: str = "Legs keep a lateral distance."
     formula: str = "|min(0, y_l - y_r - gap)|^2"
     gaps: tuple[tuple[str, float], ...] = (
-        ("ankle", 0.126),
-        ("heel", 0.126),
-        ("toe", 0.126),
-        ("knee", 0.136),
+        ("ankle", 0.107),
+        ("heel", 0.107),
+        ("toe", 0.107),
+        ("knee", 0.16),
     )
 
     def terms(self, walker: Walker) -> Sequence[Term]:

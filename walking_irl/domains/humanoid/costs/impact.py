@@ -25,8 +25,8 @@ class Impact(Cost):
     scale: float = 0.91
     meaning: str = "Squared rate of the ground reaction force under each foot."
     formula: str = "|dF/dt|^2"
-    reference: float | None = 0.5
-    planar_reference: float | None = 0.505
+    reference: float | None = 0.2024
+    planar_reference: float | None = 0.4242
     rate: float = 10.0
 
     def terms(self, walker: Walker) -> Sequence[Term]:

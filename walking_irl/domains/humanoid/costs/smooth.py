@@ -28,10 +28,10 @@ class Smoothness(Cost):
     scale: float = 6.0
     meaning: str = "Squared joint accelerations, and squared rates of the joint torques."
     formula: str = ".5 |a / (50 rad/s^2)|^2 + |dtau/dt / (5 strengths/s)|^2"
-    reference: float | None = 0.1219
-    planar_reference: float | None = 0.0907
-    acceleration: float = 50.0
-    rate: float = 5.0
+    reference: float | None = 0.127
+    planar_reference: float | None = 0.1038
+    acceleration: float = 36.0
+    rate: float = 4.0
 
     def terms(self, walker: Walker) -> Sequence[Term]:
         """Two residuals an actuated joint."""

@@ -20,10 +20,10 @@ HEAD = (
     ("trunk_axis", 0),
     ("trunk_axis", 1),
 )
-HEAD_UNITS = (8.0, 2.0, 0.5, 0.5, 0.5, 0.1, 0.1)
+HEAD_UNITS = (8.5, 1.1, 0.3, 1.0, 0.5, 0.14, 0.092)
 """Head acceleration fore-aft and lateral [m/s^2], trunk angular velocity [rad/s], tilt [rad]."""
 MOMENTUM = (("angular_momentum", 0), ("angular_momentum", 1), ("angular_momentum", 2))
-MOMENTUM_UNITS = (3.0, 4.0, 1.0)
+MOMENTUM_UNITS = (1.6, 6.4, 1.0)
 """Roll, pitch and yaw about the centre of mass [kg m^2/s]."""
 HEAD_SHARE, MOMENTUM_SHARE = 0.5 / 0.04, 0.5 / 0.06
 
@@ -34,11 +34,11 @@ class Stability(Cost):
 
     name: str = "stability"
     unit: str = "1"
-    scale: float = 0.61
+    scale: float = 3.0
     meaning: str = "Shaking of the head and trunk, and angular momentum about the centre of mass."
     formula: str = "|head|^2 / .08 + |balance|^2 / .12"
-    reference: float | None = 0.598
-    planar_reference: float | None = 0.4757
+    reference: float | None = 0.2144
+    planar_reference: float | None = 0.08204
 
     def terms(self, walker: Walker) -> Sequence[Term]:
         """One residual a component that shakes."""

@@ -18,8 +18,8 @@ class Time(Cost):
     scale: float = 0.74
     meaning: str = "Time that a metre takes."
     formula: str = "1"
-    reference: float | None = 0.5535
-    planar_reference: float | None = 0.862
+    reference: float | None = 0.2615
+    planar_reference: float | None = 1.158
 
     def terms(self, walker: Walker) -> Sequence[Term]:
         """One in every step."""

@@ -35,11 +35,11 @@ class Work(Cost):
 
     name: str = "work"
     unit: str = "100 W"
-    scale: float = 2.2
+    scale: float = 1.1
     meaning: str = "Mechanical power, negative power a fifth as dear as positive."
     formula: str = "(1.66 max(0, tau v) + .34 max(0, -tau v)) / 100 W"
-    reference: float | None = 0.3485
-    planar_reference: float | None = 0.3105
+    reference: float | None = 0.2468
+    planar_reference: float | None = 0.3762
     power: float = 100.0
     smoothing: float = 20.0
     efficiencies: tuple[float, float] = (0.25, 1.2)
