@@ -104,6 +104,12 @@ def test_smoothness_counts_the_rate_of_torques_by_strength():
     assert found == pytest.approx(step / h / (Smoothness().rate * mean))
 
 
+def test_stated_formula_of_smoothness_has_its_units():
+    cost = Smoothness()
+    assert f"a / ({cost.acceleration:g} rad/s^2)" in cost.formula
+    assert f"dtau/dt / ({cost.rate:g} strengths/s)" in cost.formula
+
+
 def test_second_partials_of_skidding_are_those_of_a_logistic_function(channels):
     stack = cost_stack(load_walker())
     k = next(k for k, p in enumerate(stack.places) if p.cost.name == "skid")

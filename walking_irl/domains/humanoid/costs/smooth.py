@@ -27,7 +27,7 @@ class Smoothness(Cost):
     unit: str = "1"
     scale: float = 6.0
     meaning: str = "Squared joint accelerations, and squared rates of the joint torques."
-    formula: str = ".5 |a / (50 rad/s^2)|^2 + |dtau/dt / (5 strengths/s)|^2"
+    formula: str = ".5 |a / (36 rad/s^2)|^2 + |dtau/dt / (4 strengths/s)|^2"
     reference: float | None = 0.127
     planar_reference: float | None = 0.1038
     acceleration: float = 36.0
