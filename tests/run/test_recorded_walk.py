@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from walking_irl.domains.humanoid.body.variants import Surroundings
-from walking_irl.domains.humanoid.costs.defaults import REFERENCE_WEIGHTS
 from walking_irl.domains.humanoid.gait.gait import Gait
 from walking_irl.domains.humanoid.learner import search, solver_for
 from walking_irl.domains.humanoid.prediction import Prediction, predict
@@ -24,6 +23,7 @@ from walking_irl.run.walk import (
 )
 from walking_irl.run.walk_report import explanation_json, force_apart
 
+REFERENCE_WEIGHTS = PLANAR.stack.reference_weights
 TRUTH = REFERENCE_WEIGHTS * [1.6, 0.8, 1.5, 0.7, 1.4, 0.8]
 TRUTH = TRUTH / TRUTH.sum()
 
