@@ -26,7 +26,8 @@ from walking_irl.domains.humanoid.gait.gait import Gait, cycle_motion
 from walking_irl.errors import InvalidInputError, SolverError
 
 POSITION_COST, VELOCITY_COST = 100.0, 0.1  # [1/rad^2], [s^2/rad^2]
-FORWARD_COST = 10.0  # on the root's x: where it walks matters less than how [1/m^2]
+PLACE_COST = 10.0  # on the root's x and y: where it walks matters less than how [1/m^2]
+PLACE = ("root_x", "root_y")
 TORQUE_COST = 3e-3  # [1/(Nm)^2]
 DIFFERENCE_STEP = 1e-6
 MAX_SWEEPS, SWEEP_TOLERANCE = 32, 1e-5
@@ -168,7 +169,7 @@ def _gains(walker: Walker, A: Array, B: Array, timestep: float) -> tuple[Array, 
     nv, nu = walker.model.nv, walker.model.nu
     mirror = _mirror_twice(walker.mirror)
     state_cost = np.repeat([POSITION_COST, VELOCITY_COST], nv)
-    state_cost[0] = FORWARD_COST
+    state_cost[[walker.joints.index(j) for j in PLACE if j in walker.joints]] = PLACE_COST
     Q, R = np.diag(state_cost) * timestep, np.eye(nu) * TORQUE_COST * timestep
     P: Array = Q
     gain = np.empty((len(A), nu, 2 * nv))
