@@ -33,7 +33,7 @@ UNIFORM_SEEDS = (100, 101)
 DIRECTIONS = {"forwards": (1, 0), "backwards": (-1, 0), "left": (0, 1), "right": (0, -1)}
 PHASES = 4
 FORCES = (80.0, 150.0)  # [N]
-REQUIRED = (1.0, 130 / 144)
+REQUIRED = (1.0, 135 / 144)
 """Least share of the pushes survived, by force."""
 SETTLE = 2  # whole cycles before the first push
 RECOVER = 6.0  # time after a push in which a fall counts [s]

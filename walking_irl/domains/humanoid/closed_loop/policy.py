@@ -28,7 +28,7 @@ from walking_irl.errors import InvalidInputError, SolverError
 POSITION_COST, VELOCITY_COST = 100.0, 0.1  # [1/rad^2], [s^2/rad^2]
 PLACE_COST = 10.0  # on the root's x and y: where it walks matters less than how [1/m^2]
 PLACE = ("root_x", "root_y")
-TORQUE_COST = 3e-3  # [1/(Nm)^2]
+TORQUE_COST = 1e-3  # [1/(Nm)^2]
 DIFFERENCE_STEP = 1e-6
 MAX_SWEEPS, SWEEP_TOLERANCE = 32, 1e-5
 
