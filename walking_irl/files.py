@@ -105,15 +105,19 @@ def write_png(path: Path, picture: NDArray[np.uint8]) -> None:
     write_file(path, content.getvalue())
 
 
-def to_plain(value: Any) -> Any:
-    """A value as JSON types; numbers that are not finite become None."""
+def to_plain(value: Any, *, is_exact: bool = False) -> Any:
+    """A value as JSON types; numbers that are not finite become None, unless it must be exact.
+
+    JSON has no such numbers; Python's reads and writes them all the same.
+    """
     if isinstance(value, Mapping):
-        return {str(k): to_plain(v) for k, v in value.items()}
+        return {str(k): to_plain(v, is_exact=is_exact) for k, v in value.items()}
     if isinstance(value, list | tuple):
-        return [to_plain(v) for v in value]
+        return [to_plain(v, is_exact=is_exact) for v in value]
     if isinstance(value, np.ndarray | np.generic):
-        return to_plain(value.tolist())
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+        return to_plain(value.tolist(), is_exact=is_exact)
+    is_none = isinstance(value, float) and not math.isfinite(value) and not is_exact
+    return None if is_none else value
 
 
 def check_writable(path: str | Path, error: type[WalkingIRLError] = InvalidInputError) -> Path:

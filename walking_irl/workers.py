@@ -105,18 +105,31 @@ def _raise(number: int, frame: Any) -> None:
     raise KeyboardInterrupt
 
 
+def interrupts_heard() -> int:
+    """How many interrupts have been raised so far while :func:`interrupts_raised`."""
+    return len(_heard)
+
+
+def interrupts_answered() -> None:
+    """Whoever ends with what is done says so: errors from here on are errors again."""
+    _heard.clear()
+
+
 @contextmanager
 def interrupts_kept() -> Iterator[None]:
     """An interrupt that foreign code has turned into another error is an interrupt all the same.
 
     NumPy's dtype promotion, for one, raises ``TypeError`` in place of whatever it was hit by.
     """
-    before = len(_heard)
+    before = interrupts_heard()
     try:
         yield
     except Exception as error:
-        if len(_heard) > before:
-            raise KeyboardInterrupt from error
+        if interrupts_heard() > before:
+            interrupt = KeyboardInterrupt()
+            for note in getattr(error, "__notes__", []):  # of what else went wrong since
+                interrupt.add_note(note)
+            raise interrupt from error
         raise
 
 

@@ -3,6 +3,7 @@
 import pickle
 import re
 import warnings
+from math import nan
 
 import numpy as np
 import pytest
@@ -137,15 +138,24 @@ def test_a_fall_terminates_and_the_time_limit_truncates(name, make):
     assert rewards[-1] < -metre, "a fall takes back a metre"
 
 
-def test_a_simulation_that_breaks_down_ends_as_a_fall(make):
-    env = make()
-    env.reset(seed=0)
-    seen, reward, terminated, truncated, info = env.step(
-        np.full(env.action_space.shape, np.nan, dtype=np.float32)
-    )
-    assert terminated and not truncated and info["fell"]
-    assert np.isfinite(seen).all() and np.isfinite(reward) and reward < 0
-    assert np.isfinite(env.reset(seed=0)[0]).all()
+@pytest.mark.parametrize("name", environments.IDS)
+@pytest.mark.parametrize("kind", ["not a number", "limits"])
+def test_a_simulation_that_breaks_down_ends_as_a_fall(name, kind, make):
+    env = make(name)
+    space, rng, lost = env.action_space, np.random.default_rng(0), 0
+    for seed in range(20 if kind == "limits" else 1):
+        seen, _ = env.reset(seed=seed)
+        assert np.isfinite(seen).all()
+        terminated = False
+        while not terminated:
+            signs = rng.integers(2, size=space.shape)
+            action = np.where(signs, space.high, space.low) if kind == "limits" else space.low * nan
+            seen, reward, terminated, truncated, info = env.step(action)
+            told = [reward, info["phi"], info["costs"], info["progress"], info["x"]]
+            assert np.isfinite(np.hstack([seen, *told])).all() and not truncated
+        assert info["fell"] and (kind == "limits" or np.all(reward <= 0))
+        lost += env.unwrapped._env.physics.has_diverged
+    assert lost > 0
 
 
 @pytest.mark.parametrize("planar", [False, True])

@@ -3,6 +3,7 @@
 A few instants of each fault; ``benchmarks/faults.py`` takes as many as are wanted.
 """
 
+import json
 import os
 import signal
 import subprocess
@@ -10,6 +11,16 @@ import sys
 
 import injection
 import pytest
+
+from walking_irl import experiments
+from walking_irl.domains import lqr
+from walking_irl.errors import RecordingError
+from walking_irl.experiments import study
+from walking_irl.experiments.study.expert import ExpertJob
+from walking_irl.recording import Recorder, stream
+from walking_irl.run import session
+from walking_irl.run.setup import Setup
+from walking_irl.workers import interrupts_raised
 
 JOB = ("--domain", "gridworld", "--seed", "2")
 
@@ -77,8 +88,6 @@ def test_a_reader_that_leaves_does_not_end_the_run(tmp_path):
 
 
 def test_an_interrupt_that_foreign_code_renames_is_an_interrupt():
-    from walking_irl.workers import interrupts_raised
-
     with pytest.raises(KeyboardInterrupt), interrupts_raised():
         try:
             os.kill(os.getpid(), signal.SIGTERM)
@@ -86,6 +95,69 @@ def test_an_interrupt_that_foreign_code_renames_is_an_interrupt():
             raise TypeError("as NumPy's promotion of dtypes does") from None
     with pytest.raises(TypeError), interrupts_raised():
         raise TypeError("nobody has interrupted")
+
+
+def renamed_interrupt(*_, **__):
+    """An interrupt that hits code which makes another error of it."""
+    try:
+        signal.raise_signal(signal.SIGTERM)
+    except KeyboardInterrupt:
+        raise TypeError("as NumPy's promotion of dtypes does") from None
+
+
+@pytest.mark.parametrize("moment", ["drawing", "solving", "scoring"])
+def test_a_run_whose_interrupt_is_renamed_is_interrupted(call, tmp_path, monkeypatch, moment):
+    """By name everywhere: exit code, report and recording; what is done is kept."""
+    solve, learn, asked = lqr.LQR.forward, session._learn, []
+
+    def forward(self, w):
+        asked.append(moment)
+        if asked[0] == "learnt" or (moment == "solving" and len(asked) == 5):
+            renamed_interrupt()
+        return solve(self, w)
+
+    def learning(*how):
+        learn(*how)
+        if moment == "scoring":
+            asked[0] = "learnt"
+
+    monkeypatch.setattr(lqr.LQR, "forward", forward)
+    monkeypatch.setattr(session, "_learn", learning)
+    if moment == "drawing":
+        monkeypatch.setattr(Recorder, "finale", renamed_interrupt)
+    code, _, err = call("recover", "--domain", "lqr", "--json", "out.json", "--record", "a.rrd")
+    content = json.loads((tmp_path / "out.json").read_text())
+    shown = injection.inspect_recording(tmp_path / "a.rrd")
+    assert not err and len(content["history"]) == shown["iterations"] >= 2
+    known = injection.load_checkpoint(tmp_path / content["checkpoint"]).answers
+    assert len(known) == len(content["history"])
+    if moment == "scoring":  # the result does not hang on it
+        assert code == 0 and shown["ending"] is None
+    else:
+        assert code == 130 and shown["ending"] == content["status"] == "interrupted"
+
+
+def test_a_recording_that_fails_after_a_renamed_interrupt_is_told(call, tmp_path, monkeypatch):
+    def full(*_):
+        raise RecordingError("no space left")
+
+    monkeypatch.setattr(Recorder, "finale", renamed_interrupt)
+    monkeypatch.setattr(stream, "write_file", full)
+    code, _, err = call("recover", "--domain", "lqr", "--json", "out.json", "--record", "a.rrd")
+    content = json.loads((tmp_path / "out.json").read_text())
+    assert code == 2 and "no space left" in err and content["recording"] is None
+    assert content["history"]
+
+
+def test_studies_and_tables_whose_interrupt_is_renamed_say_where_they_go_on(call, monkeypatch):
+    monkeypatch.setattr(study, "run_study", renamed_interrupt)
+    monkeypatch.setattr(experiments, "run_tables", renamed_interrupt)
+    for argv in (("study", "--domain", "lqr"), ("tables", "7.3", "--out", "t")):
+        code, out, err = call(*argv)
+        assert code == 130 and not err and "goes on from there" in out
+    monkeypatch.setattr(session, "run", renamed_interrupt)
+    with pytest.raises(KeyboardInterrupt), interrupts_raised():
+        ExpertJob(Setup(domain="lqr")).run()
 
 
 @pytest.mark.slow

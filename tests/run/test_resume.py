@@ -1,6 +1,7 @@
 """A run that was cut short goes on as if it had not been; all figures come from its checkpoint."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -116,6 +117,21 @@ def test_a_run_survives_the_disk(tmp_path, domain):
         assert np.array_equal(answer.sensitivity, response.sensitivity)
     pack = problem.domain.pack
     assert np.array_equal(pack(answer.policy), pack(response.policy))
+
+
+@pytest.mark.parametrize("number", [np.inf, -np.inf, np.float64("inf"), np.float32(0.1), 1e-320])
+def test_whatever_a_solver_says_of_an_answer_survives_the_disk(tmp_path, number):
+    """An indefinite Hessian has an infinite decrement; lost, a resumed run would tell less."""
+    setup = Setup(domain="lqr", weights=None, max_solves=1)
+    problem = prepare(setup)
+    w = np.full(len(problem.objectives), 1 / len(problem.objectives))
+    said = {"decrement": number, "many": [1.0, -np.inf], "status": "stuck", "is_stalled": True}
+    response = replace(problem.learner.forward(w), info=said)
+    CheckpointFile(tmp_path / "a.npz").save(
+        Checkpoint(setup, problem.demonstration, [(w, response)])
+    )
+    [(_, answer)] = load_checkpoint(tmp_path / "a.npz").answers
+    assert answer.info == said
 
 
 def test_a_file_that_grows_holds_what_one_written_at_once_holds(tmp_path):

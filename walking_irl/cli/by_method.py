@@ -24,7 +24,7 @@ from walking_irl.errors import (
 )
 from walking_irl.files import check_ending, check_outputs, write_json
 from walking_irl.run.setup import HORIZON, TRAJECTORIES, Setup
-from walking_irl.workers import interrupts_kept
+from walking_irl.workers import interrupts_answered, interrupts_kept
 
 if TYPE_CHECKING:
     from walking_irl.run.by_method import MethodReport
@@ -106,6 +106,7 @@ def _recorded(
     except RecordingError as error:
         return report, error
     except (KeyboardInterrupt, SolverError, FallError) as trouble:  # written as far as it came
+        interrupts_answered()
         notes = getattr(trouble, "__notes__", [])  # of a recording that could not be written
         if notes:
             return report, RecordingError(notes[0])

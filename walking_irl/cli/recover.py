@@ -25,7 +25,7 @@ from walking_irl.run.checkpoint import Checkpoint, load_checkpoint
 from walking_irl.run.report import Report
 from walking_irl.run.setup import Setup
 from walking_irl.types import MODES
-from walking_irl.workers import interrupts_held
+from walking_irl.workers import interrupts_held, interrupts_kept
 
 ALSO_WHEN_RESUMED = ("record", "checkpoint", "max_solves")
 """What a resumed run may be told anew."""
@@ -196,7 +196,7 @@ def _recovered(
     """The run; Ctrl-C while its workers end comes too late to take its result away."""
     report = None
     try:
-        with workers_for(domain) as executor, terminal:
+        with interrupts_kept(), workers_for(domain) as executor, terminal:
             report = session.run(
                 setup,
                 resumed=before,

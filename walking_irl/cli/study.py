@@ -21,6 +21,7 @@ from walking_irl.errors import InvalidInputError
 from walking_irl.geometry.centres import CENTRES
 from walking_irl.run.setup import Setup
 from walking_irl.types import MODES
+from walking_irl.workers import interrupts_kept
 
 MEANINGS = {
     "domain": f"{', '.join(DOMAINS)} ({Setup.domain})",
@@ -78,7 +79,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
     cells = args.out / "cells"
     with Counted(console, "experts", args.quiet) as progress:
         try:
-            with side_by_side(args.scheduler) as executor:
+            with interrupts_kept(), side_by_side(args.scheduler) as executor:
                 result = run_study(study, cells=cells, executor=executor, progress=progress)
         except KeyboardInterrupt:
             console.print(

@@ -11,6 +11,7 @@ from rich.markup import escape
 
 from walking_irl.cli import DONE, INTERRUPTED
 from walking_irl.cli.side_by_side import add_scheduler, side_by_side
+from walking_irl.workers import interrupts_kept
 
 
 def add_parser(commands: Any) -> argparse.ArgumentParser:
@@ -37,7 +38,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
             console.print(f"table {name}: {done} of {total} runs")
 
     try:
-        with side_by_side(args.scheduler) as executor:
+        with interrupts_kept(), side_by_side(args.scheduler) as executor:
             paths = run_tables(
                 args.names, seeds=args.seeds, out=args.out, executor=executor, progress=progress
             )

@@ -10,7 +10,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from dm_control.rl.control import PhysicsError
 from gymnasium import Env
 from gymnasium.spaces import Box
 from gymnasium.utils import EzPickle
@@ -18,7 +17,6 @@ from gymnasium.utils import EzPickle
 from walking_irl.arrays import Array
 from walking_irl.domains.humanoid.closed_loop.disturbance import Disturbance
 from walking_irl.domains.humanoid.closed_loop.environment import environment, start_of
-from walking_irl.domains.humanoid.closed_loop.progress import FALL_METRES
 from walking_irl.domains.humanoid.gait.pictures import Image
 from walking_irl.environments.camera import Camera, Window
 from walking_irl.environments.observation import flatten, observation_names
@@ -124,10 +122,7 @@ class WalkerEnv(Env[Any, Any], EzPickle):
             raise InvalidInputError(
                 f"an action must have shape {self.action_space.shape}, got {torques.shape}"
             )
-        try:
-            step = self._env.step(torques)
-        except PhysicsError:  # the simulation has lost the body: nothing further can be seen
-            return self._seen, self._lost_reward(), True, False, self._info(fell=True)
+        step = self._env.step(torques)
         self._seen = flatten(step.observation)
         fell = bool(self.task.has_fallen(self._env.physics))
         self._show()
@@ -151,10 +146,6 @@ class WalkerEnv(Env[Any, Any], EzPickle):
 
     def _reward(self, reward: float) -> Any:
         return float(reward)
-
-    def _lost_reward(self) -> Any:
-        speed, timestep = self.gait.speed, self._env.control_timestep()
-        return float(-self.task.price * FALL_METRES / (speed * timestep))
 
     def _info(self, fell: bool) -> dict[str, Any]:
         task = self.task
@@ -195,8 +186,5 @@ class MOWalkerEnv(WalkerEnv):
         task = self.task
         gained = task.price * task.progress
         if task.has_fallen(self._env.physics):
-            gained += super()._lost_reward()
+            gained -= task.price_of_fall
         return np.asarray(task.phi + gained)
-
-    def _lost_reward(self) -> Array:
-        return np.full(self.reward_dim, super()._lost_reward())

@@ -12,7 +12,7 @@ import rerun as rr
 from walking_irl.errors import RecordingError
 from walking_irl.files import check_writable, write_file
 from walking_irl.recording.reader import APPLICATION_ID
-from walking_irl.workers import interrupts_held
+from walking_irl.workers import interrupts_heard, interrupts_held
 
 FLUSH_SECONDS = 60.0
 
@@ -69,6 +69,7 @@ class RecordingFile(ABC):
         self.path = check_writable(path, RecordingError)
 
     def __enter__(self) -> Self:
+        self._heard = interrupts_heard()
         self._stream, self._memory = open_stream()
         self._begin()
         self._stream.flush(timeout_sec=FLUSH_SECONDS)
@@ -80,7 +81,7 @@ class RecordingFile(ABC):
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        ending = None if kind is None else _ending(kind)
+        ending = None if kind is None else _ending(kind, interrupts_heard() > self._heard)
         try:
             with interrupts_held():  # a second Ctrl-C, or one at the very end
                 save_stream(self._stream, self._memory, self.path, *self._end(ending))
@@ -98,5 +99,7 @@ class RecordingFile(ABC):
         """The summary and the properties; ``ending`` says why the block was cut short."""
 
 
-def _ending(kind: type[BaseException]) -> str:
-    return "interrupted" if kind is KeyboardInterrupt else kind.__name__
+def _ending(kind: type[BaseException], was_interrupted: bool) -> str:
+    """An interrupt may have another name by now: see :func:`.interrupts_kept`."""
+    is_interrupt = was_interrupted or kind is KeyboardInterrupt
+    return "interrupted" if is_interrupt else kind.__name__

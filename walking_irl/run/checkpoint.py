@@ -98,7 +98,7 @@ class CheckpointFile:
             new[f"evaluated_{i}"] = response.evaluated
         self._packed = with_arrays(self._packed, _given(new))
         self._run = replace(run, answers=list(run.answers))
-        about = np.array(json.dumps(to_plain(_about(run))))
+        about = np.array(json.dumps(to_plain(_about(run), is_exact=True)))
         write_file(self.path, with_arrays(self._packed, {"about": about}))
 
 

@@ -24,7 +24,7 @@ from walking_irl.run.report import Report
 from walking_irl.run.setup import Setup
 from walking_irl.run.stopwatch import Stopwatch, Timed
 from walking_irl.types import Iteration, Mode, Rule
-from walking_irl.workers import interrupts_held, interrupts_kept
+from walking_irl.workers import interrupts_answered, interrupts_held, interrupts_kept
 
 if TYPE_CHECKING:
     from walking_irl.run.film import Film
@@ -78,8 +78,10 @@ def run(
         if not report.iterations:
             raise
         _tell(trouble, report)
+        interrupts_answered()
     if problem.w_expert is not None and not report.was_interrupted:
-        with suppress(KeyboardInterrupt, SolverError, FallError):  # the result does not hang on it
+        with suppress(KeyboardInterrupt, SolverError, FallError), interrupts_kept():
+            # the result does not hang on it
             report.recovered_mu = problem.learner.forward(report.w).mu
     report.seconds = watch.finish()
     return report

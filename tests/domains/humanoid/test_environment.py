@@ -1,5 +1,7 @@
 """The environment keeps dm_control's contract, and its rewards add up to the objectives."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,7 @@ from walking_irl.domains.humanoid.closed_loop.rollout import rollout
 from walking_irl.domains.humanoid.costs.defaults import REFERENCE_WEIGHTS
 from walking_irl.domains.humanoid.costs.stack import cost_stack
 from walking_irl.domains.humanoid.gait.library import load_gaits
-from walking_irl.errors import InvalidInputError
+from walking_irl.errors import FallError, InvalidInputError
 
 
 @pytest.fixture(scope="module", params=["humanoid", "humanoid-planar"])
@@ -144,6 +146,62 @@ def test_fall_ends_the_episode_with_discount_zero(walking):
     height = env.physics.data.ptr.qpos[walking[0].joints.index("root_z")]
     pitch = env.physics.data.ptr.qpos[walking[0].joints.index("root_pitch")]
     assert height < -0.3 or abs(pitch) > 1.0
+
+
+FLAILS = range(30)
+"""Seeds; of ten, one or two end beyond what the simulation can follow."""
+
+
+def flailing(walking, seed):
+    """Torques at the limits of the control range with random signs, for 100 steps: (100, nu)."""
+    lower, upper = walking[0].model.actuator_ctrlrange.T
+    signs = np.random.default_rng(seed).integers(2, size=(100 if seed % 2 else 10, len(lower)))
+    return np.where(np.repeat(signs, 100 // len(signs), axis=0), upper, lower)
+
+
+@pytest.mark.parametrize("held", [1, 2])
+def test_torques_that_break_the_simulation_down_end_as_a_fall(walking, held):
+    """At the last state that was valid, with the price of a fall and of the step before it."""
+    env = make(walking, steps_per_control=held, weights=REFERENCE_WEIGHTS)
+    task, data, lost = env.task, env.physics.data.ptr, 0
+    for seed in FLAILS:
+        step, states, total = env.reset(), [], 0.0
+        for torques in flailing(walking, seed):
+            states.append((data.qpos.copy(), data.qvel.copy()))
+            step = env.step(torques)
+            total += step.reward
+            assert np.isfinite([step.reward, *task.phi, *task.costs, task.progress]).all()
+            assert all(np.isfinite(seen).all() for seen in step.observation.values())
+            if step.last():
+                break
+        assert step.last() and step.discount == 0.0 and task.has_fallen(env.physics)
+        assert total <= -task.price_of_fall, "it never pays"
+        if env.physics.has_diverged:
+            lost += 1
+            np.testing.assert_array_equal((data.qpos, data.qvel), states[-1])
+            np.testing.assert_array_equal(step.observation["joint_velocities"], states[-1][1])
+            paid = task.price * task.progress - REFERENCE_WEIGHTS @ task.costs
+            assert step.reward == pytest.approx(paid - task.price_of_fall)
+            after = env.step(torques)
+            assert after.first() and not env.physics.has_diverged, "as after any other end"
+    assert lost > 0
+
+
+def test_walks_that_break_the_simulation_down_are_falls(walking):
+    """Their recording ends with the last step that did."""
+    walker, _, policy = walking
+    told = []
+    for seed in FLAILS:
+        torques = np.resize(flailing(walking, seed), policy.bias.shape)
+        wild = replace(policy, gain=np.zeros_like(policy.gain), bias=torques)
+        with pytest.raises(FallError, match="fell after") as fall:
+            rollout(walker, wild, cycles=1)
+        told.append("faster than a timestep resolves" in str(fall.value))
+        walked = rollout(walker, wild, cycles=1, raise_on_fall=False)
+        recorded = np.hstack([walked.q, walked.v, walked.a, walked.u, walked.sensors])
+        assert np.isfinite(recorded).all()
+        assert len(walked.q) * policy.timestep == pytest.approx(fall.value.time)
+    assert any(told) and not all(told)
 
 
 def test_held_actions_take_several_steps(walking):

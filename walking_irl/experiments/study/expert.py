@@ -11,6 +11,7 @@ from walking_irl.run import session
 from walking_irl.run.report import Report
 from walking_irl.run.setup import Setup
 from walking_irl.types import Certainty, Rule
+from walking_irl.workers import interrupts_kept
 
 FILES = ("record", "checkpoint", "demonstration", "weights")
 """Fields of a setup that an expert of a study has not."""
@@ -44,7 +45,8 @@ class ExpertJob:
         """
         start, cpu = time.perf_counter(), time.process_time()
         try:
-            found = outcome_of(session.run(self.setup))
+            with interrupts_kept():
+                found = outcome_of(session.run(self.setup))
         except (MemoryError, OSError):
             raise
         except WalkingIRLError as problem:

@@ -8,14 +8,13 @@ is, so the reward of a step belongs to the step before it.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
 from dm_control.rl import control
 from dm_env import specs
 
-from walking_irl.arrays import Array, Indices
+from walking_irl.arrays import Array
 from walking_irl.domains.humanoid.body.anatomy import Walker
 from walking_irl.domains.humanoid.body.physics import WalkerPhysics
 from walking_irl.domains.humanoid.closed_loop.disturbance import (
@@ -24,7 +23,7 @@ from walking_irl.domains.humanoid.closed_loop.disturbance import (
     Push,
 )
 from walking_irl.domains.humanoid.closed_loop.progress import FALL_METRES, price_of_progress
-from walking_irl.domains.humanoid.closed_loop.step import Step, Views
+from walking_irl.domains.humanoid.closed_loop.step import Start, Step, Views, runs
 from walking_irl.domains.humanoid.costs.base import REFERENCE_SPEED, Channels
 from walking_irl.domains.humanoid.costs.defaults import DEFAULT_COSTS, Costs
 from walking_irl.domains.humanoid.costs.stack import cost_stack
@@ -36,20 +35,6 @@ FALL_DROP = 0.3  # of the pelvis below upright standing [m]
 FALL_PITCH = 1.0  # of the pelvis [rad]
 
 
-class Start(NamedTuple):
-    """Where a walk begins, and the gait that it follows.
-
-    ``q`` [m, rad] and ``v`` [m/s, rad/s] have shape (nv,); ``timestep`` [s] is the simulation's,
-    ``period`` [s] the duration of a gait cycle, ``speed`` [m/s] the gait's.
-    """
-
-    q: Array
-    v: Array
-    timestep: float
-    period: float
-    speed: float
-
-
 class WalkTask(control.Task):  # type: ignore[misc]
     """Walk along a gait's phase without falling, for progress and low costs.
 
@@ -58,6 +43,7 @@ class WalkTask(control.Task):  # type: ignore[misc]
             the gait's speed is mu.
         costs: Total costs of that step, shape (K,), if it is as long as the gait's.
         progress: Length of that step, in steps of the gait's mean length.
+        price_of_fall: What a fall takes back.
         last: The last step, recorded.
         n_steps: Steps since the start of the episode.
     """
@@ -82,14 +68,15 @@ class WalkTask(control.Task):  # type: ignore[misc]
         self.disturbance = disturbance or Disturbance()
         self.control_timestep = start.timestep * steps_per_control
         self.steps_per_cycle = round(start.period / self.control_timestep)
+        self.price_of_fall = price * FALL_METRES / (start.speed * self.control_timestep)
         self._forget()
         self._steps_per_control = steps_per_control
         stage = np.repeat(walker.model.sensor_needstage, walker.model.sensor_dim)
-        self._late = _runs(np.flatnonzero(stage == mujoco.mjtStage.mjSTAGE_ACC))
+        self._late = runs(np.flatnonzero(stage == mujoco.mjtStage.mjSTAGE_ACC))
         self._unit = np.ones(walker.model.nsensordata)  # of the sensors as they are observed
         touch = np.array([walker.sensor[f"touch_{side}"].start for side in "rl"])
         self._unit[touch] = walker.weight
-        (self._touch,) = _runs(touch)
+        (self._touch,) = runs(touch)
         angle = 2 * math.pi / self.steps_per_cycle * np.arange(self.steps_per_cycle)
         self._phases = np.column_stack([np.cos(angle), np.sin(angle)])
         self._height = walker.joints.index("root_z")
@@ -127,24 +114,45 @@ class WalkTask(control.Task):  # type: ignore[misc]
 
     def after_step(self, physics: WalkerPhysics) -> Step:
         """Record the step, compute the features of the one before, and kick for the next."""
-        views = self._views
-        q, v, sensors = self._state
-        if self._steps_per_control == 1:  # force and acceleration are known only now
-            for late in self._late:
-                sensors[late] = views.sensors[late]
-        a = (views.v - v) / self.control_timestep
-        step = Step(q, v, a, views.torque.copy(), sensors)
+        if physics.has_diverged:
+            step = self._lost(physics)
+        else:
+            step = self._taken()
         if self.weights is not None and self.last is not None:
             self._evaluate(self.last, step)
         self.last = step
         self.n_steps += 1
-        if self.disturbance.kicks > 0:
+        if self.disturbance.kicks > 0 and not physics.has_diverged:
             if self.n_steps % self.steps_per_cycle == self._kick_at:
                 self._kick(physics.data.ptr, self.disturbance.kicks)
                 mujoco.mj_step1(physics.model.ptr, physics.data.ptr)
             if self.n_steps % self.steps_per_cycle == 0:
                 self._kick_at = self.random.randint(self.steps_per_cycle)
         return step
+
+    def _taken(self) -> Step:
+        views, (q, v, sensors) = self._views, self._state
+        if self._steps_per_control == 1:  # force and acceleration are known only now
+            for late in self._late:
+                sensors[late] = views.sensors[late]
+        a = (views.v - v) / self.control_timestep
+        return Step(q, v, a, views.torque.copy(), sensors)
+
+    def _lost(self, physics: WalkerPhysics) -> Step:
+        """End an episode whose state is lost where it was last valid, with the forces from then.
+
+        That completes the step before; of the step itself nothing is known.
+        """
+        views, (q, v, sensors), data = self._views, self._state, physics.data.ptr
+        if self.last is not None:  # in mid-step, forces may be those that nothing can withstand
+            for late in self._late:
+                sensors[late] = self.last.sensors[late]
+        views.q[:], views.v[:], views.ctrl[:] = q, v, 0.0
+        data.time = self.n_steps * self.control_timestep
+        mujoco.mj_step1(physics.model.ptr, data)
+        views.sensors[:] = sensors
+        u = np.zeros(len(views.ctrl)) if self.last is None else self.last.u
+        return Step(q, v, np.zeros_like(v), u, sensors)
 
     def get_reward(self, physics: WalkerPhysics) -> float:
         """Price x progress - w.costs of the last complete step; without a price, w.phi."""
@@ -154,7 +162,7 @@ class WalkTask(control.Task):  # type: ignore[misc]
             return float(self.weights @ self.phi)
         reward = self.price * self.progress - float(self.weights @ self.costs)
         if self.has_fallen(physics):
-            reward -= self.price * FALL_METRES / (self.start.speed * self.control_timestep)
+            reward -= self.price_of_fall
         return reward
 
     def get_termination(self, physics: WalkerPhysics) -> float | None:
@@ -162,10 +170,10 @@ class WalkTask(control.Task):  # type: ignore[misc]
         return 0.0 if self.has_fallen(physics) else None
 
     def has_fallen(self, physics: WalkerPhysics) -> bool:
-        """Whether the pelvis is too low or too far tilted, or the state is not finite."""
+        """Whether the pelvis is too low or too far tilted, or the simulation has lost the body."""
         q = self._views.q.tolist()
         upright = q[self._height] > -FALL_DROP and abs(q[self._pitch]) < FALL_PITCH
-        return not (upright and math.isfinite(sum(q)))
+        return physics.has_diverged or not (upright and math.isfinite(sum(q)))
 
     def get_observation(self, physics: WalkerPhysics) -> dict[str, Array]:
         """What a controller may see; everything but the position on the ground."""
@@ -227,12 +235,6 @@ class WalkTask(control.Task):  # type: ignore[misc]
 def _check_weights(weights: Array | None, K: int) -> None:
     if weights is not None and np.shape(weights) != (K,):
         raise InvalidInputError(f"weights must have shape ({K},), got {np.shape(weights)}")
-
-
-def _runs(indices: Indices) -> list[slice]:
-    """Increasing indices as slices, which NumPy reads faster."""
-    parts = np.split(indices, np.flatnonzero(np.diff(indices) != 1) + 1)
-    return [slice(int(part[0]), int(part[-1]) + 1) for part in parts]
 
 
 def start_of(walker: Walker, gait: Gait, *, substeps: int = 1) -> Start:

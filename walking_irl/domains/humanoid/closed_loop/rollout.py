@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from dm_control.rl.control import PhysicsError
 
 from walking_irl.domains.humanoid.body.anatomy import Walker
 from walking_irl.domains.humanoid.body.physics import WalkerPhysics
 from walking_irl.domains.humanoid.closed_loop.disturbance import Disturbance, Push
-from walking_irl.domains.humanoid.closed_loop.environment import Start, WalkTask, environment
+from walking_irl.domains.humanoid.closed_loop.environment import WalkTask, environment
 from walking_irl.domains.humanoid.closed_loop.policy import TrackingPolicy
-from walking_irl.domains.humanoid.closed_loop.step import Step
+from walking_irl.domains.humanoid.closed_loop.step import Start, Step
 from walking_irl.domains.humanoid.gait.cycles import mirror_average
 from walking_irl.domains.humanoid.gait.gait import Gait
 from walking_irl.errors import FallError, InvalidInputError
@@ -113,16 +112,18 @@ class Course:
         q, v = physics.data.ptr.qpos, physics.data.ptr.qvel
         for k in range(n_samples):
             task.before_step(policy.torque(k, q, v), physics)
-            try:
-                physics.step()
-            except PhysicsError:
-                return steps, True
-            steps.append(task.after_step(physics))
+            physics.step()
+            step = task.after_step(physics)
+            if not physics.has_diverged or not steps:  # of a step that is lost nothing is known
+                steps.append(step)
             if task.has_fallen(physics):
                 return steps, True
         return steps, False
 
     def _fall(self, time: float) -> FallError:
+        if self._physics.has_diverged:
+            told = "torques moved it faster than a timestep resolves"
+            return FallError(f"the walker fell after {time:.2f} s: {told}", time)
         q, joints = self._physics.data.ptr.qpos, self.walker.joints
         height, pitch = (q[joints.index(j)] for j in ("root_z", "root_pitch"))
         return FallError(
