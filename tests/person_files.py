@@ -108,11 +108,16 @@ def z_up(columns):
 
 
 def clinical(columns):
-    """Signs and names of a gait laboratory; the thorax is left out."""
-    out = {"time": columns["time"]}
-    out["pelvis_tilt"] = -columns["pelvis_tilt"]
-    out["pelvis_obliquity"] = -columns["pelvis_list"]
-    out["pelvis_rotation"] = columns["pelvis_rotation"]
+    """Signs and names of a gait laboratory; the thorax is left out.
+
+    Its pelvis turns, then lists, then tilts (R. Baker 2001, Gait Posture 13:1); OpenSim's tilts
+    first, about an axis of the laboratory: other angles where a walk heads 25 degrees aside.
+    """
+    opensim = np.deg2rad(np.column_stack([columns[f"pelvis_{n}"] for n in ANGLES]))
+    pelvis = TO_MODEL @ Rotation.from_euler("ZXY", opensim).as_matrix() @ TO_MODEL.T
+    rotation, side_down, tilt = np.rad2deg(Rotation.from_matrix(pelvis).as_euler("ZXY")).T
+    out = {"time": columns["time"], "pelvis_tilt": tilt}
+    out |= {"pelvis_obliquity": -side_down, "pelvis_rotation": rotation}
     for side in "rl":
         for name in ("hip_flexion", "hip_adduction", "hip_rotation"):
             out[f"{name}_{side}"] = columns[f"{name}_{side}"]

@@ -1,5 +1,7 @@
 """Recordings are read as what they show, whatever their dialect, axes, units and gaps."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from person_files import (
@@ -17,8 +19,9 @@ from person_files import (
 
 from walking_irl.domains.humanoid.body.load import load_walker
 from walking_irl.domains.humanoid.gait.files import save_gait
-from walking_irl.domains.humanoid.gait.gait import Gait
+from walking_irl.domains.humanoid.gait.gait import Gait, whole_cycle
 from walking_irl.domains.humanoid.gait.library import load_gaits
+from walking_irl.domains.humanoid.recorded.cycle import HARMONICS
 from walking_irl.domains.humanoid.recorded.person import Options
 from walking_irl.domains.humanoid.recorded.reader import LEGS, read_person
 from walking_irl.errors import InvalidInputError
@@ -26,9 +29,6 @@ from walking_irl.errors import InvalidInputError
 WALKER = load_walker()
 GAIT = load_gaits()["reference"]
 COLUMNS = [WALKER.joints.index(n) for n in LEGS]
-CUT = 0.6
-"""Nine harmonics leave this much of a gait whose contacts are sharp [deg rms over the legs]."""
-
 SINK = 0.02
 """The model's soles sink 14 mm under load, so its own walks look so much shorter-legged."""
 ROLL = 0.05
@@ -38,6 +38,30 @@ ROLL = 0.05
 def legs_apart(a, b):
     """Root mean square difference of the legs' angles [deg]."""
     return float(np.rad2deg(np.sqrt(np.mean((a.q[:, COLUMNS] - b.q[:, COLUMNS]) ** 2))))
+
+
+def as_read(gait):
+    """The gait as recordings are read: thighs as they are, pelvis without its mean tilt."""
+    q = gait.q.copy()
+    tilt = q[:, WALKER.joints.index("root_pitch")].mean()
+    for side in "rl":
+        q[:, WALKER.joints.index(f"hip_flexion_{side}")] -= tilt
+    return replace(gait, q=q)
+
+
+def with_harmonics(gait, n):
+    """The gait with its first n harmonics only; x, which advances, is spoilt."""
+    f = np.fft.rfft(whole_cycle(gait, WALKER.mirror), axis=0)
+    f[n + 1 :] = 0
+    return replace(gait, q=np.fft.irfft(f, 2 * gait.n_knots, axis=0)[: gait.n_knots])
+
+
+SHOWN = as_read(GAIT)
+"""What a recording of GAIT shows."""
+TIMING = 0.1
+"""Contacts to a thousandth of a cycle: legs turn by a degree rms in a hundredth [deg]."""
+CUT = legs_apart(with_harmonics(GAIT, HARMONICS), GAIT) + TIMING
+"""The harmonics that are kept leave this much of a gait whose contacts are sharp [deg rms]."""
 
 
 @pytest.fixture
@@ -57,7 +81,7 @@ def walk():
 
 def test_a_model_walk_comes_back_within_the_cut_of_the_harmonics(read, walk):
     person = read(storage(walk))
-    assert legs_apart(person.gait, GAIT) < CUT
+    assert legs_apart(person.gait, SHOWN) < CUT
     assert person.half_period == pytest.approx(GAIT.half_period, abs=0.003)
     assert person.step_length == pytest.approx(GAIT.step_length, rel=0.01)
     assert person.heading == pytest.approx(25, abs=0.5)
@@ -76,7 +100,7 @@ def test_noise_of_two_degrees_is_averaged(read):
     """Three whole cycles: noise of 2 degrees falls below 2 / sqrt(3 cycles x 2 sides) + the cut."""
     noisy = recording(GAIT, WALKER, cycles=4, noise=2.0, rng=np.random.default_rng(1))
     person = read(storage(noisy))
-    assert legs_apart(person.gait, GAIT) < 2 / np.sqrt(6) + CUT
+    assert legs_apart(person.gait, SHOWN) < 2 / np.sqrt(6) + CUT
     assert 1.0 < person.residual < 2.5
 
 
@@ -137,10 +161,7 @@ DIALECTS = {
 @pytest.mark.parametrize("dialect", DIALECTS)
 def test_dialects_say_the_same(read, walk, dialect):
     person = read(*DIALECTS[dialect](walk))
-    # a laboratory's file has no subtalar joint: a contact is found a sample elsewhere, and with it
-    # the period, by .6 %
-    bound = 0.2 if dialect == "clinical" else 0.1
-    assert legs_apart(person.gait, read(storage(walk)).gait) < bound
+    assert legs_apart(person.gait, read(storage(walk)).gait) < 0.01
     assert person.speed == pytest.approx(GAIT.speed, rel=0.015)
 
 
@@ -148,7 +169,7 @@ def test_dialects_say_the_same(read, walk, dialect):
 @pytest.mark.parametrize("belt", [0.0, GAIT.speed])
 def test_any_direction_and_a_treadmill(read, heading, belt):
     person = read(storage(recording(GAIT, WALKER, heading=heading, belt=belt)))
-    assert legs_apart(person.gait, GAIT) < CUT
+    assert legs_apart(person.gait, SHOWN) < CUT
     assert person.speed == pytest.approx(GAIT.speed, rel=ROLL if belt else 0.01)
     assert person.belt == pytest.approx(belt, rel=ROLL)
     assert any("treadmill" in n for n in person.notes) == (belt > 0)
@@ -157,13 +178,13 @@ def test_any_direction_and_a_treadmill(read, heading, belt):
 @pytest.mark.parametrize("start", [0.0, 0.1, 0.35, 0.8])
 def test_any_start_of_the_record(read, start):
     person = read(storage(recording(GAIT, WALKER, start=start, cycles=1.5)))
-    assert legs_apart(person.gait, GAIT) < CUT
+    assert legs_apart(person.gait, SHOWN) < CUT
 
 
 @pytest.mark.parametrize("hz", [50.0, 60.0, 240.0, 1000.0])
 def test_any_rate(read, hz):
     person = read(storage(recording(GAIT, WALKER, hz=hz)))
-    assert legs_apart(person.gait, GAIT) < CUT
+    assert legs_apart(person.gait, SHOWN) < CUT
     assert person.rate == pytest.approx(hz, rel=1e-3)
 
 
@@ -192,16 +213,16 @@ def test_a_pelvis_and_trunk_frame_of_another_marker_set_do_not_matter(read):
 def test_a_turning_walk_is_read_where_it_is_straight(read):
     columns = recording(GAIT, WALKER, cycles=9, turn=(6.0, 1.2), heading=30.0)
     person = read(storage(columns))
-    assert legs_apart(person.gait, GAIT) < CUT
+    assert legs_apart(person.gait, SHOWN) < CUT
     assert person.heading == pytest.approx(30, abs=3)
     assert any("straight" in n for n in person.notes)
 
 
 def test_gaps_jitter_and_repeated_times_are_named_and_do_not_matter(read, walk):
     gap = read(storage(with_gaps(walk, 40, 48)))
-    assert legs_apart(gap.gait, GAIT) < CUT and any("gap" in n for n in gap.notes)
+    assert legs_apart(gap.gait, SHOWN) < CUT and any("gap" in n for n in gap.notes)
     tail = read(storage(with_gaps(with_gaps(walk, 200, 232), 60, 80)))
-    assert legs_apart(tail.gait, GAIT) < 2.5
+    assert legs_apart(tail.gait, SHOWN) < 2.5
     rng = np.random.default_rng(0)
     time = walk["time"] + rng.uniform(-0.003, 0.003, len(walk["time"]))
     order = np.argsort(time)
@@ -211,7 +232,7 @@ def test_gaps_jitter_and_repeated_times_are_named_and_do_not_matter(read, walk):
     shaken["time"] = at
     shaken = part(shaken, np.sort(np.r_[order, 30, 30, 31]))
     person = read(storage(shaken))
-    assert legs_apart(person.gait, GAIT) < CUT
+    assert legs_apart(person.gait, SHOWN) < CUT
     assert any("repeat" in n for n in person.notes)
 
 
@@ -224,20 +245,20 @@ def test_a_single_absurd_number_is_a_gap_or_refused(read, walk, name, value):
         person = read(storage(spoilt))
     except InvalidInputError:
         return
-    assert legs_apart(person.gait, GAIT) < CUT
+    assert legs_apart(person.gait, SHOWN) < CUT
 
 
 def test_an_empty_column_counts_as_missing(read, walk):
     person = read(storage(with_gaps(walk, 0, 220, ["elbow_flex_r"])))
     assert "elbow_flex_r" in person.missing
-    assert legs_apart(person.gait, GAIT) < CUT
+    assert legs_apart(person.gait, SHOWN) < CUT
 
 
 def test_without_a_path_the_feet_say_how_far(read, walk):
     angles = {n: c for n, c in walk.items() if n not in ("pelvis_tx", "pelvis_ty", "pelvis_tz")}
     person = read(storage(angles))
     assert any("height" in n for n in person.notes)
-    assert legs_apart(person.gait, GAIT) < CUT
+    assert legs_apart(person.gait, SHOWN) < CUT
     assert person.speed == pytest.approx(GAIT.speed, rel=0.1)
 
 
@@ -254,7 +275,7 @@ def test_a_table_in_percent_needs_the_time_of_a_cycle(tmp_path, walk):
         with pytest.raises(InvalidInputError, match="cycle-time"):
             read_person([tmp_path / name], WALKER)
         person = read_person([tmp_path / name], WALKER, options)
-        assert legs_apart(person.gait, GAIT) < 2 * CUT, name
+        assert legs_apart(person.gait, SHOWN) < CUT, name
         assert person.half_period == pytest.approx(GAIT.half_period)
 
 
@@ -289,8 +310,8 @@ def test_trials_of_one_person_are_averaged(tmp_path):
         paths.append(tmp_path / f"trial{k}.mot")
         paths[-1].write_text(storage(columns))
     person = read_person(paths, WALKER)
-    alone = [legs_apart(read_person([p], WALKER).gait, GAIT) for p in paths]
-    assert legs_apart(person.gait, GAIT) < 0.8 * np.mean(alone)
+    alone = [legs_apart(read_person([p], WALKER).gait, SHOWN) for p in paths]
+    assert legs_apart(person.gait, SHOWN) < 0.8 * np.mean(alone)
     assert person.cycles == 4 and person.covariance is not None
     assert person.sources == tuple(paths)
 
@@ -361,7 +382,9 @@ def test_crouched_and_slow_walks_are_still_walks(read):
             q[:, WALKER.joints.index(f"{joint}_{side}")] += np.deg2rad(more)
     q[:, 2] -= 0.03
     crouched = Gait(q, GAIT.step_length, GAIT.half_period)
-    assert legs_apart(read(storage(recording(crouched, WALKER))).gait, crouched) < 1.5
+    found = read(storage(recording(crouched, WALKER)))
+    # bent knees move where the ankles pass, and with it the first knot, by .4 % of a cycle
+    assert legs_apart(found.gait, as_read(crouched)) < CUT + 0.3
     slow = Gait(GAIT.q, GAIT.step_length, 0.79)
     found = read(storage(recording(slow, WALKER, cycles=3)))
     assert found.speed == pytest.approx(slow.speed, rel=0.02)
